@@ -472,7 +472,7 @@ class TestSnapshot:
         root = self.load(running)
         root.save(str(tmp_path / "early.png"))
         wait(lambda: "refused" in root.list())
-        assert "no picture is shown" in root.list()
+        assert "no image is shown" in root.list()
         show(running, camera, wait, root, quarters())
         root.save(str(tmp_path / "a.gif"))
         root.save(str(tmp_path / "nowhere" / "a.png"))

@@ -456,7 +456,7 @@ class QmlOverlay(QmlInput, LiveOverlay):
             return
         need = need_in_items(item, self.file) or otherwise()
         if need:
-            self._undrawable = choice.tell_missing(need)
+            self._undrawable = choice.missing_warning(need)
             _log.warning("overlay %s: %s", self.name, self._undrawable)
             self.show_problem(self.problem)
 

@@ -168,7 +168,7 @@ def test_mixing_with_a_robot_is_said(
     [
         ({"topics": ["/nope"]}, "has no topic /nope; it has /chatter"),
         ({"exclude": ".*"}, "nothing to play"),
-        ({"exclude": "("}, "no regular expression"),
+        ({"exclude": "("}, "not a regular expression"),
         ({"rate": 0}, "rate must be a number"),
         ({"start": 99}, "start must be a number from 0 to"),
         ({"topics": "/chatter"}, "as a list"),

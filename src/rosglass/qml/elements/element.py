@@ -77,7 +77,7 @@ class Element(QtCore.QObject):
 
     #: The module whose spelling of values and types applies.
     DIALECT: ClassVar[Dialect] = Dialect.ROS2
-    #: Attributes with messages and pictures, deleted when QML destroys the object: PySide 6.11
+    #: Attributes with messages and images, deleted when QML destroys the object: PySide 6.11
     #: never frees the Python half of an object created by QML.
     _HOLDS: tuple[str, ...] = ()
     #: Arguments of the endpoint that exists or is being created; None without one.
@@ -390,7 +390,7 @@ class TopicElement(Element):
         if topic == self._resolved:
             return  # the topic is the same, but no longer depends on the node's namespace
         self._resolved = ""
-        # A paused picture would stay on the screen under the new topic's name.
+        # A paused image would stay on the screen under the new topic's name.
         self._clear_shown()
         self.topicChanged.emit()  # type: ignore[attr-defined]
         self._schedule()

@@ -1,4 +1,4 @@
-"""Goals in QML: handles of sent goals and of those that a server executes, and their states."""
+"""Goals in QML: handles of goals that a client sent or a server executes, and their states."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -279,7 +279,7 @@ class GoalHandle(QtCore.QObject):
 
     @property
     def sent(self) -> bool:
-        """Whether the goal was passed to a client of the node."""
+        """True once the goal was passed to a client of the node."""
         return self._goal is not None
 
     @property
@@ -734,7 +734,7 @@ class ServerGoalHandle(QtCore.QObject):
             self.cancelRequestedChanged.emit()
             QtCore.QTimer.singleShot(_REMINDER, self._remind)
         canceling = status is GoalStatus.CANCELING and self._status is not GoalStatus.CANCELING
-        self._tell(self._goal.status)
+        self._set_status(self._goal.status)
         # Unless a handler has ended it.
         if canceling and is_alive(self) and self.isCanceling:
             self.cancelRequested.emit()
@@ -753,7 +753,7 @@ class ServerGoalHandle(QtCore.QObject):
             )
             log_from_qml("", logging.WARNING, text, self._caller)
 
-    def _tell(self, status: GoalStatus) -> None:
+    def _set_status(self, status: GoalStatus) -> None:
         if status is not self._status:
             self._status = status
             self.statusChanged.emit(int(status_code(status)))

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["GRABBED", "ImagePublisher", "ItemGrab", "RosImagePublisher", "pixels_of"]
 
-#: Encodings that a grabbed picture can be converted to: Qt's format, and channels.
+#: Encodings that a grabbed image can be converted to: Qt's format, and channels.
 GRABBED = {
     "rgb8": ("Format_RGB888", 3),
     "bgr8": ("Format_BGR888", 3),
@@ -45,16 +45,16 @@ _GREY = (0.299, 0.587, 0.114)
 
 
 class ItemGrab:
-    """A grab of one picture of an item, with the next frame of its renderer.
+    """Grabs one image of an item, with the next frame of its renderer.
 
     Args:
         item: The item.
-        size: Width and height of the picture in pixels; None for the item's size on the screen.
-        done: Called with the picture, on the GUI thread.
+        size: Width and height of the image in pixels; None for the item's size on the screen.
+        done: Called with the image, on the GUI thread.
 
     Attributes:
-        problem: Why there will be no picture; empty if one is possible.
-        size: Requested width and height of the picture, pixels.
+        problem: Why the item cannot be grabbed; empty if it can.
+        size: Requested width and height of the image, pixels.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class ItemGrab:
 
     @property
     def is_possible(self) -> bool:
-        """Whether the picture is still possible: the item exists and is in the same window."""
+        """True while the grab is possible: the item exists and is in the same window."""
         return self._result is not None and is_alive(self._item) and is_alive(self.window)
 
     def cancel(self) -> None:
@@ -103,12 +103,12 @@ class ItemGrab:
 
 
 def pixels_of(image: QtGui.QImage, size: tuple[int, int], encoding: str) -> NDArray[Any]:
-    """Return the pixels of a grabbed picture; thread-safe.
+    """Return the pixels of a grabbed image; thread-safe.
 
     If the encoding has no transparency, transparent areas become black.
 
     Args:
-        image: The grabbed picture.
+        image: The grabbed image.
         size: Requested width and height, pixels.
         encoding: One of :data:`GRABBED`.
 
@@ -123,7 +123,7 @@ def pixels_of(image: QtGui.QImage, size: tuple[int, int], encoding: str) -> NDAr
         image = image.scaled(*size, modes, smooth)
     name, channels = GRABBED[encoding]
     if encoding != "rgba8" and image.hasAlphaChannel():
-        # Premultiplied colours without alpha are the picture on a black background.
+        # Premultiplied colours without alpha are the image on a black background.
         image = image.convertToFormat(formats.Format_ARGB32_Premultiplied)
         image.reinterpretAsFormat(formats.Format_RGB32)
     image = image.convertToFormat(getattr(formats, name))
@@ -143,7 +143,7 @@ _INFO = "sensor_msgs/msg/CameraInfo"
 _MAX_RATE, _MAX_SIDE = 120.0, 16384
 #: Seconds after which a window that is not drawn is reported.
 _DRAW_TIMEOUT_S = 2.0
-#: Number of pictures over which the frequency is measured.
+#: Number of images over which the frequency is measured.
 _MARKS = 30
 
 
@@ -177,7 +177,7 @@ class ImagePublisher(Element):
 
     source = Writable(QtCore.QObject, None, _item, then="_abandon")
     topic = Writable(str, "")
-    #: Pictures per second; 0 publishes on request.
+    #: Images per second; 0 publishes on request.
     rate = Writable(float, 10.0, within(0, _MAX_RATE, "per second"))
     encoding = Writable(str, "rgb8", one_of(*GRABBED), then="")
     transport = Writable(str, "raw", one_of("raw", "compressed"))
@@ -255,10 +255,10 @@ class ImagePublisher(Element):
 
     @Slot(result=bool)
     def publish(self) -> bool:
-        """Publish a picture of the item when it is next drawn.
+        """Publish an image of the item when it is next drawn.
 
         Returns:
-            Whether one will be published; without subscribers, only if :attr:`always` is set.
+            True if one will be published; without subscribers, only if :attr:`always` is set.
         """
         if self._endpoint is not None:
             if not self._is_wanted() or self._take():
@@ -269,7 +269,7 @@ class ImagePublisher(Element):
         runtime = self._find_runtime()
         if runtime is not None:
             caller = runtime.caller()
-            text = f"no picture was published on {self.topic}: {why}"
+            text = f"no image was published on {self.topic}: {why}"
             if self._limit.allows((caller, text)):
                 log_from_qml("", logging.WARNING, text, caller)
         return False
@@ -390,7 +390,7 @@ class ImagePublisher(Element):
         self._measure()
 
     def _measure(self) -> None:
-        """Report the rate of published pictures, and whether one is overdue."""
+        """Report the rate of published images, and whether one is overdue."""
         now, sent = time.monotonic(), self._sent
         age = now - sent[-1] if sent else math.inf
         longest = max(1.0, 3 / self.rate if self.rate else 0.0)
@@ -402,11 +402,11 @@ class ImagePublisher(Element):
 
 
 class _Publishers:
-    """The publishers of pictures and, if wanted, of camera information.
+    """The publishers of images and, if wanted, of camera information.
 
     Args:
         node: The node.
-        topic: Base topic of the pictures.
+        topic: Base topic of the images.
         transport: ``raw`` or ``compressed``.
         info: Whether camera information is wanted.
 
@@ -454,7 +454,7 @@ def _fields(
     kind: str,
     quality: int,
 ) -> dict[str, Any]:
-    """Return the fields of a picture's message except its header; thread-safe."""
+    """Return the fields of an image's message except its header; thread-safe."""
     pixels = pixels_of(image, size, encoding)
     if transport == "compressed":
         from rosglass.images.compressed import compress  # noqa: PLC0415 - needs numpy

@@ -1,4 +1,4 @@
-"""Converts received pictures to video frames and images for displays, each step only once."""
+"""Converts received images to video frames and images for displays, each step only once."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ class VideoFrame:
 
 
 _WHOLE = View()
-#: Factor by which a reduced picture may be smaller than its size on the screen.
+#: Factor by which a reduced image may be smaller than its size on the screen.
 _UNSEEN = 1.05
 #: Maximum number of colour settings whose automatic range is kept; a slider creates many.
 _MOST_COLORS = 8
@@ -150,16 +150,16 @@ _MOST_COLORS = 8
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """The settings of a viewer's view; viewers with equal looks share their pictures.
+    """The settings of a viewer's view; viewers with equal looks share their images.
 
     Attributes:
         video: Whether the viewer needs video frames; otherwise images.
         view: The visible part and its rotation.
         colors: Colour map, nearest and farthest depth for depth images; or how their numbers are
             shown as greys; None for greys of fixed depths.
-        interval: Seconds between two pictures; 0 for all pictures.
-        room: Width and height of the picture on the screen, pixels, before rotation; larger
-            pictures are reduced to about this size. None keeps their size.
+        interval: Seconds between two images; 0 for all images.
+        room: Width and height of the image on the screen, pixels, before rotation; larger
+            images are reduced to about this size. None keeps their size.
         painted: Whether each video frame also needs an image, because only images are drawn.
     """
 
@@ -176,7 +176,7 @@ class Look:
         return {self.video, self.video and not self.painted}
 
     def factor(self, image: RawImage) -> int:
-        """Return the factor by which a picture can be reduced without a visible difference."""
+        """Return the factor by which an image can be reduced without a visible difference."""
         if self.room is None or self.view.region is not None or self.view.zoom > 1:
             return 1
         ratio = min(image.width / self.room[0], image.height / self.room[1])
@@ -185,7 +185,7 @@ class Look:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A converted picture for viewers.
+    """A converted image for viewers.
 
     Attributes:
         frame: Its size, encoding and stamps; its planes may share the memory of `video`.
@@ -194,7 +194,7 @@ class Picture:
         received: Time of arrival.
         late: Seconds that it was delayed in transit.
         made: When it was ready, in seconds of the clock that measures ages.
-        whole: The received picture, if `frame` is smaller.
+        whole: The received image, if `frame` is smaller.
     """
 
     frame: Frame
@@ -207,14 +207,14 @@ class Picture:
 
 
 def whole_frame(picture: Picture, look: Look) -> Frame:
-    """Return a picture as a viewer shows it, at the received resolution."""
+    """Return an image as a viewer shows it, at the received resolution."""
     if picture.whole is None:
         return picture.frame
     return look.view.apply(convert(picture.whole, IMAGE_FORMATS, picture.received))
 
 
 class Renderer:
-    """Converts the pictures of one stream; used by its thread only.
+    """Converts the images of one stream; used by its thread only.
 
     Args:
         clock: The clock that measures ages.
@@ -222,26 +222,26 @@ class Renderer:
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
-        #: The depth colours adapt to the pictures, separately for each setting.
+        #: The depth colours adapt to the images, separately for each setting.
         self._colors: dict[Any, DepthColors | GreyLevels] = {}
 
     def render(
         self, image: RawImage, received: Time, late: float, looks: Iterable[Look]
     ) -> tuple[dict[Look, Picture], dict[Look, str]]:
-        """Convert a picture for each of the given looks.
+        """Convert an image for each of the given looks.
 
         Args:
-            image: The picture as received.
+            image: The image as received.
             received: Time of arrival.
             late: Seconds that it was delayed in transit.
             looks: The wanted looks.
 
         Returns:
-            The pictures, and the reasons for looks that this picture cannot be shown with.
+            The images, and the reasons for looks that this image cannot be shown with.
 
         Raises:
-            DecodeError: The picture is inconsistent.
-            UnsupportedError: The picture cannot be shown at all.
+            DecodeError: The image is inconsistent.
+            UnsupportedError: The image cannot be shown at all.
         """
         groups: dict[Any, dict[View, list[Look]]] = {}
         for look in looks:
@@ -252,7 +252,7 @@ class Renderer:
         for (colors, factor), views in groups.items():
             small = reduce(image, factor)
             kinds = {kind for members in views.values() for look in members for kind in look.kinds}
-            # An unmodified picture can be converted directly into the display's memory.
+            # An unmodified image can be converted directly into the display's memory.
             straight = VideoFrame() if kinds == {True} and [*views] == [_WHOLE] else None
             frame = self._convert(small, received, colors, kinds, straight)
             for view, members in views.items():

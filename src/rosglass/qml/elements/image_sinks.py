@@ -1,4 +1,4 @@
-"""Sinks that show pictures: video sinks (Qt 6), video surfaces (Qt 5), and :class:`ImageItem`."""
+"""Sinks that show images: video sinks (Qt 6), video surfaces (Qt 5), and :class:`ImageItem`."""
 # ruff: noqa: N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ def _items_of(window: QtQuick.QQuickWindow) -> Iterator[QtQuick.QQuickItem]:
 
 
 def grab(window: QtQuick.QQuickWindow) -> QtGui.QImage:
-    """Return a picture of a window that shows all that there is.
+    """Return an image of a window that shows everything.
 
-    A ``SceneView`` (``is_complete``) uploads large data over several pictures.
+    A ``SceneView`` (``is_complete``) uploads large data over several frames.
     """
     drawn = -1
     while True:
@@ -76,25 +76,25 @@ def is_painted(window: QtQuick.QQuickWindow) -> bool:
     return window.rendererInterface().graphicsApi() in (kinds.Software, kinds.OpenVG)
 
 
-#: The QML file of the item that paints a VideoOutput's pictures.
+#: The QML file of the item that paints a VideoOutput's images.
 _PAINTED_VIDEO = Path(__file__).with_name("PaintedVideo.qml")
 #: An item's size is rounded up to multiples of this, in pixels, so that resizing has few steps.
 _STEP = 8
-_NOT_DRAWN = "Qt's software renderer draws no VideoOutput, and its pictures cannot be painted"
+_NOT_DRAWN = "Qt's software renderer draws no VideoOutput, and its images cannot be painted"
 
 
 class Sink:
-    """Shows the pictures of one viewer; used on the GUI thread.
+    """Shows the images of one viewer; used on the GUI thread.
 
     A VideoOutput needs the graphics card. In a window that Qt's software renderer draws, an
-    :class:`ImageItem` inside it paints the pictures of its video sink.
+    :class:`ImageItem` inside it paints the images of its video sink.
 
     Args:
         item: The value of ``videoSink`` or ``videoSurface`` in QML.
-        source: The element whose pictures it shows; used to find Qt 5's VideoOutput.
+        source: The element whose images it shows; used to find Qt 5's VideoOutput.
 
     Raises:
-        UnsupportedError: The item cannot show pictures.
+        UnsupportedError: The item cannot show images.
     """
 
     def __init__(self, item: QtCore.QObject, source: QtCore.QObject | None = None) -> None:
@@ -118,13 +118,13 @@ class Sink:
 
     @property
     def is_alive(self) -> bool:
-        """Whether the item still exists."""
+        """True while the item exists."""
         return is_alive(self.item)
 
     def room(self) -> tuple[int, int] | None:
         """Return its width and height on the screen in pixels, rounded up; None if unknown.
 
-        The size is unknown if the item that shows the pictures cannot be found.
+        The size is unknown if the item that shows the images cannot be found.
         """
         item = self.item if isinstance(self.item, ImageItem) else self.item.parent()
         window = window_of(item) if isinstance(item, QtQuick.QQuickItem) else None
@@ -141,16 +141,16 @@ class Sink:
         return (sides[1], sides[0]) if turned else (sides[0], sides[1])
 
     def is_painted(self) -> bool:
-        """Return whether a video sink's pictures must be painted to be visible."""
+        """Return whether a video sink's images must be painted to be visible."""
         output = self._find_output() if self.takes_video else None
         window = window_of(output) if output is not None else None
         return window is not None and is_painted(window)
 
     def show(self, picture: Picture) -> bool:
-        """Show a picture; return false if it was made for another type of sink.
+        """Show an image; return false if it was made for another type of sink.
 
         Raises:
-            UnsupportedError: The surface does not accept such pictures.
+            UnsupportedError: The surface does not accept such images.
         """
         painted = self.is_painted()
         made = picture.video if self.takes_video else picture.image
@@ -169,7 +169,7 @@ class Sink:
         return True
 
     def clear(self) -> None:
-        """Remove the picture from the screen; the item keeps its implicit size."""
+        """Remove the image from the screen; the item keeps its implicit size."""
         if is_alive(self._painter):
             self._painter.present(None)
         if not self.is_alive:
@@ -208,7 +208,7 @@ class Sink:
         return self._output
 
     def _find_painter(self) -> Any:
-        """Return the item that paints in a VideoOutput; created for the first picture.
+        """Return the item that paints in a VideoOutput; created for the first image.
 
         Raises:
             UnsupportedError: The VideoOutput's engine does not have our types.
@@ -238,14 +238,14 @@ class Sink:
             self._layout = layout
             if not surface.start(self._multimedia.QVideoSurfaceFormat(*layout)):
                 raise UnsupportedError(
-                    f"the video surface takes no pictures of {layout[1].name.decode()}; "
+                    f"the video surface takes no images of {layout[1].name.decode()}; "
                     "show them in an ImageItem"
                 )
         surface.present(video)
 
 
 class ImageItem(QtQuick.QQuickPaintedItem):
-    """An item that paints the newest picture.
+    """An item that paints the newest image.
 
     Replaces a VideoOutput where that shows nothing: software rendering, offscreen, overlays,
     installations without QtMultimedia. It is its own ``videoSink``.
@@ -255,7 +255,7 @@ class ImageItem(QtQuick.QQuickPaintedItem):
 
     @QtCore.QEnum
     class FillMode(IntEnum):
-        """How a picture of another shape fills the item; names and numbers of VideoOutput."""
+        """How an image of another aspect ratio fills the item; names and numbers of VideoOutput."""
 
         Stretch = 0
         PreserveAspectFit = 1
@@ -283,7 +283,7 @@ class ImageItem(QtQuick.QQuickPaintedItem):
             self.update()
 
     def paint(self, painter: QtGui.QPainter) -> None:
-        """Paint the picture; Qt calls it on the render thread while the GUI thread waits."""
+        """Paint the image; Qt calls it on the render thread while the GUI thread waits."""
         image = self._image
         if image is None:
             return
@@ -293,11 +293,11 @@ class ImageItem(QtQuick.QQuickPaintedItem):
         painter.drawImage(target, image, source)
 
     def _is_smooth(self, target: QtCore.QRectF, source: QtCore.QRectF) -> bool:  # noqa: ARG002 - for subclasses
-        """Return whether pixels are mixed where a part of the picture is drawn."""
+        """Return whether pixels are mixed where a part of the image is drawn."""
         return self.smooth()
 
     def _place(self, image: QtGui.QImage) -> tuple[QtCore.QRectF, QtCore.QRectF]:
-        """Return the target rectangle and the part of the picture drawn in it."""
+        """Return the target rectangle and the part of the image drawn in it."""
         width, height = self.width(), self.height()
         whole = QtCore.QRectF(0, 0, image.width(), image.height())
         target = QtCore.QRectF(0, 0, width, height)

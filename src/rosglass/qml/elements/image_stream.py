@@ -26,25 +26,25 @@ __all__ = ["SharedStream", "Viewer"]
 #: Milliseconds that a stream without viewers stays subscribed, so that changing pages is cheap.
 _LINGER = 1000
 _RATE_WINDOW, _LATENCY_WINDOW = 30, 10
-#: Factor by which the wanted interval must exceed the possible one before pictures are fetched
+#: Factor by which the wanted interval must exceed the possible one before images are fetched
 #: one by one.
 _HYSTERESIS = 1.1
-#: Decay of the estimated cost of fetching, per picture that was not fetched.
+#: Decay of the estimated cost of fetching, per image that was not fetched.
 _FORGETTING = 0.9
 
 
 class Viewer(Protocol):
-    """Shows the pictures of a stream; all its methods are called on the GUI thread."""
+    """Shows the images of a stream; all its methods are called on the GUI thread."""
 
     def show_picture(self, picture: Picture) -> None:
-        """Show a picture."""
+        """Show an image."""
 
     def stream_changed(self) -> None:
         """Read the stream's problem, transport and so on again."""
 
 
 class Channel:
-    """The viewers of a stream with the same look; each picture is converted once for all of them.
+    """The viewers of a stream with the same look; each image is converted once for all of them.
 
     Args:
         look: Their look.
@@ -53,23 +53,23 @@ class Channel:
     def __init__(self, look: Look) -> None:
         self.look = look
         self.viewers: list[Viewer] = []
-        #: The newest picture shown, for viewers that join later.
+        #: The newest image shown, for viewers that join later.
         self.last: Picture | None = None
-        #: Why the pictures cannot be shown with this look, though with others; empty if they can.
+        #: Why the images cannot be shown with this look, though with others; empty if they can.
         self.problem = ""
         self._pace = Pace()
         self._arrivals: deque[float] = deque(maxlen=_RATE_WINDOW)
 
     def is_due(self, now: float) -> bool:
-        """Return whether the next picture is due."""
+        """Return whether the next image is due."""
         return self._pace.wait(self.look.interval, now) <= 0
 
     def take(self, now: float) -> None:
-        """Count a picture, so that the mean rate does not exceed the requested one."""
+        """Count an image, so that the mean rate does not exceed the requested one."""
         self._pace.take(self.look.interval, now)
 
     def show(self, picture: Picture) -> None:
-        """Show a picture to all viewers."""
+        """Show an image to all viewers."""
         self.last = picture
         note_time(self._arrivals, time.monotonic())
         for viewer in list(self.viewers):
@@ -77,7 +77,7 @@ class Channel:
 
     @property
     def frame_rate(self) -> float:
-        """Pictures shown per second; 0 when they have stopped."""
+        """Images shown per second; 0 when they have stopped."""
         return rate_of(self._arrivals, time.monotonic())
 
 
@@ -93,8 +93,8 @@ class _Pending:
 class SharedStream(QtCore.QObject):
     """An :class:`ImageStream` and its viewers; lives on the GUI thread.
 
-    The newest picture wins: a picture that the GUI thread has not taken before the next is ready is
-    dropped and counted. While all viewers want fewer pictures than the camera sends, pictures are
+    The newest image wins: an image that the GUI thread has not taken before the next is ready is
+    dropped and counted. While all viewers want fewer images than the camera sends, images are
     fetched one by one, at times scheduled by the session's load balancer.
     """
 
@@ -116,16 +116,16 @@ class SharedStream(QtCore.QObject):
         self._network: deque[float] = deque(maxlen=_LATENCY_WINDOW)
         self._processing: deque[float] = deque(maxlen=_LATENCY_WINDOW)
         self._total: deque[float] = deque(maxlen=_LATENCY_WINDOW)
-        #: Seconds between two pictures that satisfy all viewers; 0 if one viewer wants all.
+        #: Seconds between two images that satisfy all viewers; 0 if one viewer wants all.
         self._interval = 0.0
-        #: Seconds between two pictures when all are received, and seconds that fetching one takes.
+        #: Seconds between two images when all are received, and seconds that fetching one takes.
         self._period = self._price = 0.0
         self._asked: float | None = None
         self._last_stamp: Time | None = None
         self._balancer = LoadBalancer.of(session)
         executor = session.executor
         self.stream = ImageStream(
-            node, topic, self._render, preferred, lambda: executor.post(self._tell), self._wanted
+            node, topic, self._render, preferred, lambda: executor.post(self._notify), self._wanted
         )
         self._linger = QtCore.QTimer(self)
         self._linger.setSingleShot(True)
@@ -158,7 +158,7 @@ class SharedStream(QtCore.QObject):
         return made
 
     def change_look(self, viewer: Viewer, look: Look) -> None:
-        """Change a viewer's look from the next picture on."""
+        """Change a viewer's look from the next image on."""
         self._take_out(viewer)
         channel = next((c for c in self._channels if c.look == look), None)
         if channel is None:
@@ -193,12 +193,12 @@ class SharedStream(QtCore.QObject):
 
     @property
     def dropped(self) -> int:
-        """Number of pictures that were replaced by newer ones before they could be shown."""
+        """Number of images that were replaced by newer ones before they could be shown."""
         return self.stream.statistics().dropped + self._overtaken
 
     @property
     def lost(self) -> int:
-        """Number of pictures that were sent but never arrived."""
+        """Number of images that were sent but never arrived."""
         return self.stream.statistics().lost
 
     @property
@@ -220,30 +220,30 @@ class SharedStream(QtCore.QObject):
         interval = min(intervals, default=self._interval)
         if interval != self._interval:
             self._interval = interval
-            # The user may need pictures before the next turn.
+            # The user may need images before the next turn.
             self._turn.stop()
             self._balancer.forget(self)
             self._fetch()
 
     def _wanted(self) -> bool:
-        """Return whether a received picture is needed; in the middleware's thread."""
+        """Return whether a received image is needed; in the middleware's thread."""
         if self._due():
             return True
         self._rest_if_possible()
         return False
 
     def _due(self) -> list[Channel]:
-        """Return the channels that need a picture now."""
+        """Return the channels that need an image now."""
         now = time.monotonic()
-        # A turn may be somewhat earlier than the time at which a picture is due.
+        # A turn may be somewhat earlier than the time at which an image is due.
         early = self._interval / 2 if self._asked is not None else 0.0
         return [channel for channel in self._channels if channel.is_due(now + early)]
 
     # Turns.
 
     def _rest_if_possible(self) -> None:
-        """Stop receiving until the next turn, if pictures can be fetched one by one."""
-        if not self._interval:  # also 0 for a picture that arrives during the stream's creation
+        """Stop receiving until the next turn, if images can be fetched one by one."""
+        if not self._interval:  # also 0 for an image that arrives during the stream's creation
             return
         stream = self.stream
         self._period = stream.period or self._period
@@ -270,13 +270,13 @@ class SharedStream(QtCore.QObject):
         if self.stream.resume():
             self._asked = time.monotonic()
 
-    # Pictures.
+    # Images.
 
     def _render(self, image: RawImage, sample: Sample) -> None:
-        """Convert a received picture for the channels that need it; in the stream's thread."""
+        """Convert a received image for the channels that need it; in the stream's thread."""
         now, channels = time.monotonic(), self._due()
         repeated = image.stamp is not None and image.stamp == self._last_stamp
-        # A latched picture that is sent again to a new subscriber is not new.
+        # A latched image that is sent again to a new subscriber is not new.
         if not channels or (repeated and self._interval):
             return
         self._last_stamp = image.stamp
@@ -290,7 +290,7 @@ class SharedStream(QtCore.QObject):
         if pictures:
             self._hand_over(_Pending(pictures, sample.received, image.stamp))
         if failed:
-            self._session.executor.post(self._tell)
+            self._session.executor.post(self._notify)
         if self._asked is None:
             self._price *= _FORGETTING
         else:
@@ -319,7 +319,7 @@ class SharedStream(QtCore.QObject):
             self._network.append((pending.received - pending.stamp).seconds * 1000)
             self._total.append((shown - pending.stamp).seconds * 1000)
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         for channel in self._channels:
             for viewer in list(channel.viewers):
                 viewer.stream_changed()

@@ -39,12 +39,12 @@ __all__ = [
 
 #: Number of future turns of each other stream that are considered.
 _MOST_TURNS = 64
-#: Maximum delay of a turn in seconds: later pictures would count as old.
+#: Maximum delay of a turn in seconds: later images would count as old.
 _MOST_DELAY = 1.0
 
 
 class LoadBalancer:
-    """Schedules the pictures that throttled streams fetch one by one."""
+    """Schedules the images that throttled streams fetch one by one."""
 
     @classmethod
     def of(cls, session: Session) -> LoadBalancer:
@@ -53,20 +53,20 @@ class LoadBalancer:
         return balancer
 
     def __init__(self) -> None:
-        #: Whether streams may fetch single pictures; otherwise they receive all of them.
+        #: Whether streams may fetch single images; otherwise they receive all of them.
         self.enabled = True
         #: Time of each stream's next turn, and the interval between its turns, both in seconds.
         self._turns: dict[object, tuple[float, float]] = {}
 
     def place(self, stream: object, interval: float, now: float) -> float:
-        """Return the time, in seconds, at which a stream should fetch its next picture.
+        """Return the time, in seconds, at which a stream should fetch its next image.
 
         A new stream gets the middle of the largest gap before `now` plus `interval`. After that,
         its turns are `interval` apart, or somewhat more to avoid the turn of another stream.
 
         Args:
             stream: The stream.
-            interval: Wanted seconds between two pictures.
+            interval: Wanted seconds between two images.
             now: The current time, seconds.
         """
         before = self._turns.pop(stream, None)
@@ -107,13 +107,13 @@ def _widest(taken: list[float], begin: float, end: float) -> float:
 
 def _quarter_turns(degrees: int) -> int:
     if degrees % 90:
-        raise ValueError("is no multiple of 90 degrees")
+        raise ValueError("is not a multiple of 90 degrees")
     return degrees % 360
 
 
 def _zoom(zoom: float) -> float:
     if not 1 <= zoom < math.inf:
-        raise ValueError("is below 1, where the whole picture is shown")
+        raise ValueError("is below 1, where the whole image is shown")
     return zoom
 
 
@@ -121,7 +121,7 @@ def _region(region: QtCore.QRectF) -> QtCore.QRectF:
     edges = (region.x(), region.y(), region.width(), region.height())
     if not all(0 <= edge < 1e6 for edge in edges):
         raise ValueError(
-            "is no part of a picture: give x, y, width and height in pixels from its top "
+            "is not part of an image: give x, y, width and height in pixels from its top "
             "left corner"
         )
     return QtCore.QRectF(region)
@@ -129,13 +129,13 @@ def _region(region: QtCore.QRectF) -> QtCore.QRectF:
 
 def _depth(depth: float) -> float:
     if not math.isfinite(depth):
-        raise ValueError("is no depth; metres, or -1 to follow the camera")
+        raise ValueError("is not a depth; give metres, or -1 to follow the camera")
     return depth
 
 
 def _rate(rate: float) -> float:
     if not 0 <= rate < math.inf:
-        raise ValueError("is no number of pictures per second")
+        raise ValueError("is not a number of images per second")
     return rate
 
 
@@ -147,13 +147,13 @@ class LookElement(TopicElement):
     mirrored = Writable(bool, False)
     flipped = Writable(bool, False)
     zoom = Writable(float, 1.0, _zoom)
-    #: In pixels from the top left corner; an empty rectangle means the whole picture.
+    #: In pixels from the top left corner; an empty rectangle means the whole image.
     regionOfInterest = Writable(QtCore.QRectF, QtCore.QRectF(), _region)
     colorMap = Writable(str, "")
     #: Metres; -1 follows the camera.
     minimumDepth = Writable(float, -1.0, _depth)
     maximumDepth = Writable(float, -1.0, _depth)
-    #: Pictures per second at most; 0 shows all.
+    #: Images per second at most; 0 shows all.
     throttleRate = Writable(float, 0.0, _rate)
     fullResolution = Writable(bool, False)
 
@@ -188,7 +188,7 @@ class LookElement(TopicElement):
 
     @property
     def _interval(self) -> float:
-        """Minimum seconds between two pictures."""
+        """Minimum seconds between two images."""
         return 1 / self.throttleRate if self.throttleRate else 0.0
 
     @property
@@ -222,9 +222,9 @@ class ImageTransportSubscription(LookElement):
     topicChanged = Signal()
     videoSinkChanged = Signal()
     playbackStateChanged = Signal()
-    #: A picture was saved to this file (absolute path).
+    #: An image was saved to this file (absolute path).
     snapshotSaved = Signal(str)
-    #: Saving a picture failed, for this reason.
+    #: Saving an image failed, for this reason.
     snapshotFailed = Signal(str)
 
     topic = Writable(str, read="_get_topic", write="_set_topic")
@@ -305,7 +305,7 @@ class ImageTransportSubscription(LookElement):
 
     @Slot()
     def pause(self) -> None:
-        """Stop receiving; keep the last picture on the screen, marked as stale."""
+        """Stop receiving; keep the last image on the screen, marked as stale."""
         self._set_paused(True)
 
     @Slot()
@@ -323,7 +323,7 @@ class ImageTransportSubscription(LookElement):
 
     @Slot(str, result=QJSValue)
     def saveSnapshot(self, path: str) -> QJSValue:
-        """Save the current picture to a file, on a thread other than the GUI thread.
+        """Save the current image to a file, on a thread other than the GUI thread.
 
         Args:
             path: The file, as a path or ``file:`` URL; its extension determines the format.
@@ -347,11 +347,11 @@ class ImageTransportSubscription(LookElement):
 
         look = self._shown_look
         if picture is None or look is None:
-            done(Error("no picture is shown"))
+            done(Error("no image is shown"))
             return promise.promise
 
         def work() -> Path:
-            # Keep the picture, not only its frame, until then: its video may own the memory.
+            # Keep the image, not only its frame, until then: its video may own the memory.
             return rosglass.images.save(_rendering().whole_frame(picture, look), plain_path(path))
 
         runtime.session.background(work, done)
@@ -447,11 +447,11 @@ class ImageTransportSubscription(LookElement):
         return look
 
     def show_picture(self, picture: Picture) -> None:
-        """Show a picture; called by the stream on the GUI thread."""
+        """Show an image; called by the stream on the GUI thread."""
         sink = self._sink
         if not is_alive(self) or sink is None or not sink.is_alive or self._paused:
             return
-        # A picture delayed by an interrupted link would be cleared immediately.
+        # An image delayed by an interrupted link would be cleared immediately.
         if self.timeout and self._age(picture) > self._max_age_s:
             return
         try:
@@ -472,7 +472,7 @@ class ImageTransportSubscription(LookElement):
             self._refresh()
 
     def _clear_shown(self) -> None:
-        """Remove the picture from the screen."""
+        """Remove the image from the screen."""
         self._picture, self._blank = None, True
         if self._sink is not None:
             self._sink.clear()
@@ -481,7 +481,7 @@ class ImageTransportSubscription(LookElement):
 
     @property
     def _max_age_s(self) -> float:
-        """Seconds after which a picture counts as old."""
+        """Seconds after which an image counts as old."""
         return (self.timeout or DEFAULT_TIMEOUT_MS) / 1000 + self._interval
 
     def _age(self, picture: Picture) -> float:
@@ -493,7 +493,7 @@ class ImageTransportSubscription(LookElement):
 
     def _update_stale(self) -> None:
         super()._update_stale()
-        # An old picture that looks live is dangerous.
+        # An old image that looks live is dangerous.
         if self.timeout and not self._blank and not self._paused and self._is_old():
             self._clear_shown()
 
@@ -561,9 +561,9 @@ class ImageTransportManager(QtCore.QObject):
 
     @Slot(bool)
     def setLoadBalancingEnabled(self, enabled: bool) -> None:
-        """Set whether streams of throttled cameras take turns to fetch single pictures.
+        """Set whether streams of throttled cameras take turns to fetch single images.
 
-        Otherwise all pictures are received, and surplus ones are not decoded.
+        Otherwise all images are received, and surplus ones are not decoded.
         """
         if enabled != self._balancer.enabled:
             self._balancer.enabled = enabled

@@ -71,7 +71,7 @@ class TreeItem:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether this is an array of fixed length."""
+        """True for an array of fixed length."""
         return self.member is not None and self.member.fixed_count is not None
 
     @property
@@ -506,7 +506,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         if type(row) is not int or type(count) is not int or count < 1 or item is None:
             return None
         if not item.is_array or item.is_fixed:
-            kind = "has a fixed length" if item.is_array else "is no array"
+            kind = "has a fixed length" if item.is_array else "is not an array"
             self._complain(f"{what}: {item.path or 'the message'} {kind}")
             return None
         return item

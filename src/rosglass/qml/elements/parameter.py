@@ -130,7 +130,7 @@ class ParameterLink:
 
     @property
     def ready(self) -> bool:
-        """Whether the node exists and serves its parameters."""
+        """True while the node exists and serves its parameters."""
         client = self._client
         try:
             return client is not None and client.ready

@@ -182,7 +182,7 @@ class ServiceClient(ClientElement):
             fields = given_fields(request.value, client.type.request, self._dialect)
             call = client.call_async(fields, timeout=None)
         except Error as error:
-            self._end(request, error, tell=not running)
+            self._end(request, error, notify=not running)
             if running and self._runtime is not None:
                 self._runtime.throw(self._dialect.spelled(f"service {self._name}: {error}"))
             return
@@ -211,14 +211,14 @@ class ServiceClient(ClientElement):
             ),
         )
 
-    def _end(self, request: _Request, result: Message | Error, *, tell: bool = True) -> None:
+    def _end(self, request: _Request, result: Message | Error, *, notify: bool = True) -> None:
         if request not in self._requests:
             return
         self._requests.remove(request)
         if request.call is not None:
             request.call.cancel()
         report(self, pendingRequests=len(self._requests))
-        if tell:
+        if notify:
             request.done(result)
 
     def _fail_all(self, error: Error) -> None:

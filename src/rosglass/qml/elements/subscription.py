@@ -482,10 +482,10 @@ def next_message(
         return QJSValue()
     if callback is not None and callback.isCallable():
 
-        def tell(message: QJSValue | None) -> None:
+        def pass_on(message: QJSValue | None) -> None:
             call_back(runtime, callback, QJSValue() if message is None else message)
 
-        wait_for_message(runtime, subscription, topic, milliseconds, tell)
+        wait_for_message(runtime, subscription, topic, milliseconds, pass_on)
         return QJSValue()
     if callback is not None:
         runtime.throw(f"waitForMessageAsync({topic!r}): the callback is not a function")

@@ -42,7 +42,7 @@ _LOOK_UP_S = 1.0
 
 def _finite(rate: float) -> float:
     if not math.isfinite(rate):
-        raise ValueError("is no number of updates per second")
+        raise ValueError("is not a number of updates per second")
     return rate
 
 

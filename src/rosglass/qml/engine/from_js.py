@@ -92,7 +92,7 @@ def elements_from_js(values: QJSValue, kind: str) -> list[Any]:
         kind: Element type, for errors.
 
     Raises:
-        ConversionError: An element is no integer.
+        ConversionError: An element is not an integer.
     """
     found = []
     for index, value in enumerate(_list(values, kind)):

@@ -1,6 +1,6 @@
 """The process around interfaces: its display, its signals, and no network for QML.
 
-Qt Quick fetches pictures, fonts, QML files and modules from any address in QML or rich text. It
+Qt Quick fetches images, fonts, QML files and modules from any address in QML or rich text. It
 uses its own threads for this, which must not call Python: such a thread would wait for the GIL, and
 the GUI thread, which holds the GIL, for that thread. So Qt gets a proxy that refuses every request.
 Qt uses no proxy for addresses of this machine (``localhost``). For the same reason, Python cannot

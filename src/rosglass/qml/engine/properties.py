@@ -167,7 +167,7 @@ class ReadOnly(_Declaration[_T]):
 
 
 def report(item: QtCore.QObject, **values: object) -> bool:
-    """Store new values of read-only properties, then emit the signals of those that changed.
+    """Store new values of read-only properties, then emit the signals of changed ones.
 
     Handlers see all new values. If a handler destroys the object, no more signals are emitted; if
     it changes a value, the remaining handlers see the changed value.

@@ -381,12 +381,12 @@ class Session(QtCore.QObject):
 
     @property
     def closed(self) -> bool:
-        """Whether the session was closed, as at the end of the program."""
+        """True once the session was closed, as at the end of the program."""
         return self._closed
 
     @property
     def is_initialized(self) -> bool:
-        """Whether init() was called and no shutdown has followed."""
+        """True from init() to the next shutdown."""
         return bool(self.name)
 
     @property
@@ -421,7 +421,7 @@ class Session(QtCore.QObject):
 
     @property
     def owns_node(self) -> bool:
-        """Whether it creates the node by :attr:`url`; false for an adopted node."""
+        """True if it creates the node by :attr:`url`, False for an adopted node."""
         return self._owns_node
 
     def steady(self) -> float:

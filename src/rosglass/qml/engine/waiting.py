@@ -49,7 +49,7 @@ class _Keeper(QtCore.QObject):
 def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> bool:
     """Wait for an operation; the interface keeps running.
 
-    Events are handled as usual: pictures are drawn, a stop button works. Returns early if the
+    Events are handled as usual: frames are drawn, a stop button works. Returns early if the
     program ends.
 
     Args:

@@ -50,7 +50,7 @@ _LOAD_FACTOR = 4
 #: Seconds within which the next JavaScript function cannot start.
 _LATE = 30e-6
 _OURS = str(Path(__file__).parents[2])
-#: Where Qt's own QML files are.
+#: The URLs at which Qt's own QML files begin.
 _QT_FILES = ("qrc:/qt-project.org/", "qrc:/qt/qml/")
 _LIBRARIES = (sysconfig.get_paths()["stdlib"], *{sysconfig.get_paths()[p] for p in ("purelib",)})
 _ADVICE = "let it end, or do its work in pieces by a Timer"
@@ -63,19 +63,19 @@ class _Watched(NamedTuple):
     Attributes:
         engine: The engine.
         stack: Its JavaScript stack.
-        tell: Called on the GUI thread with a description of what was done to the engine.
+        report: Called on the GUI thread with a description of the interruption.
         waiting: Frame of the innermost function when the event loop was last seen to run; if not
             0, this function waits in its own event loop.
     """
 
     engine: QtQml.QQmlEngine
     stack: JsStack
-    tell: Callable[[str], None]
+    report: Callable[[str], None]
     waiting: list[int]
 
     @property
     def is_running(self) -> bool:
-        """Whether JavaScript runs, or C++ or Python code that it has called."""
+        """True while JavaScript runs, or C++ or Python code that it has called."""
         return self.stack.is_known and self.stack.frame != self.waiting[0]
 
     def hold(self, wanted: tuple[int, int], seconds: float) -> float:
@@ -95,16 +95,16 @@ class _Watched(NamedTuple):
         frame, waiting = self.stack.pointer, self.waiting[0] or None
         # Compare the function, too: the next one may already have started.
         function = self.stack.function_of(outermost)
-        tell, clock = self.engine.setInterrupted, time.perf_counter
+        interrupt, clock = self.engine.setInterrupted, time.perf_counter
         seen = now = clock()
         until = now + seconds
-        tell(True)
+        interrupt(True)
         try:
             # Every fraction of a microsecond counts here.
             while frame.value != waiting and function.value == handler and now < until:
                 seen, now = now, clock()
         finally:
-            tell(False)
+            interrupt(False)
         return clock() - seen
 
     @property
@@ -179,15 +179,16 @@ class Watchdog(QtCore.QObject):
             found = session.shared[cls] = Watchdog(session)
         return found
 
-    def watch(self, engine: QtQml.QQmlEngine, tell: Callable[[str], None]) -> None:
+    def watch(self, engine: QtQml.QQmlEngine, report: Callable[[str], None]) -> None:
         """Start watching an engine.
 
         Args:
             engine: The engine; call :meth:`forget` before it is destroyed.
-            tell: Called on the GUI thread with what was done to the engine, or why nothing was.
+            report: Called on the GUI thread with a description of the interruption, or why none was
+                possible.
         """
         stack = JsStack(engine)
-        self._watched[id(engine)] = _Watched(engine, stack, tell, [stack.frame])
+        self._watched[id(engine)] = _Watched(engine, stack, report, [stack.frame])
         if self._thread is None:
             self._beaten = self._looked = time.monotonic()
             self._lives = False
@@ -295,7 +296,7 @@ class Watchdog(QtCore.QObject):
                 if self._beaten == beaten and not is_own and self._end_script(innermost, script):
                     return
             if self._lives and still >= limit and not self._report and self._beaten == beaten:
-                self._tell_still(still, innermost)
+                self._report_still(still, innermost)
 
     def _end_script(self, watched: _Watched, seconds: float) -> bool:
         """End the running JavaScript; return whether it ended."""
@@ -322,7 +323,7 @@ class Watchdog(QtCore.QObject):
                 sys.setswitchinterval(before)
         if ended:
             self._report = ""
-            self._tell_ended(watched, callers, seconds, late)
+            self._report_ended(watched, callers, seconds, late)
         return ended
 
     def _computes(self) -> bool:
@@ -334,7 +335,7 @@ class Watchdog(QtCore.QObject):
             pass
         return self._clock() - before > _GLANCE / 5
 
-    def _tell_ended(
+    def _report_ended(
         self, watched: _Watched, callers: list[Caller], seconds: float, late: float
     ) -> None:
         where = callers[0] if callers else Caller("<unknown>", 0, "")
@@ -348,7 +349,7 @@ class Watchdog(QtCore.QObject):
         log_from_qml("", logging.ERROR, text, where)
         self._show(watched, text)
 
-    def _tell_still(self, seconds: float, watched: _Watched | None) -> None:
+    def _report_still(self, seconds: float, watched: _Watched | None) -> None:
         """Report a blocked GUI thread that is not in JavaScript and cannot be interrupted."""
         frame = sys._current_frames().get(self._main)
         callers = watched.stack.callers() if watched is not None else []
@@ -363,7 +364,7 @@ class Watchdog(QtCore.QObject):
     def _show(self, watched: _Watched, text: str) -> None:
         def show() -> None:
             if is_alive(watched.engine):
-                watched.tell(text)
+                watched.report(text)
 
         self._session.executor.post(show)
 

@@ -60,8 +60,8 @@ class Application(Handle):
             pointer is hidden. ``Qt.quit()``, Ctrl-C and SIGTERM end the program.
         renderer: "opengl", "software" (Qt's own renderer, without shaders), or "auto" for the
             software renderer if there is no graphics card and the file needs none.
-        allow_network: Let Qt fetch pictures, QML files and modules that QML and rich text name on
-            other machines. Otherwise network access is blocked in this process from now on.
+        allow_network: Let Qt fetch images, QML files and modules from other machines, as QML and
+            rich text may ask for. Otherwise network access is blocked in this process from now on.
 
     Raises:
         QmlError: The file or folder does not exist, or is not QML.
@@ -190,7 +190,7 @@ class Application(Handle):
 
     @property
     def is_loading(self) -> bool:
-        """Whether a 3D view in the window still reads files, such as the robot's meshes."""
+        """True while a 3D view in the window reads files, such as the robot's meshes."""
         return self.window is not None and is_loading(self.window)
 
     def quit(self, code: int = 0) -> None:

@@ -397,7 +397,7 @@ class LiveFile(QtCore.QObject):
 
     @property
     def watch(self) -> bool:
-        """Whether the files are watched."""
+        """True while the files are watched."""
         return self._watcher is not None
 
     @watch.setter
@@ -511,9 +511,9 @@ class LiveFile(QtCore.QObject):
         # The call that has ended must still return into QML.
         if self._deferred:
             self._deferred = False
-            QtCore.QTimer.singleShot(0, self._tell_due)
+            QtCore.QTimer.singleShot(0, self._emit_due)
 
-    def _tell_due(self) -> None:
+    def _emit_due(self) -> None:
         if not self._closed:
             self.due.emit()
 

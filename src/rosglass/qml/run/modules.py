@@ -38,7 +38,7 @@ _LIBRARY = "libQt5Qml.so.5"
 _LIBRARIES = {".so", ".dylib", ".dll"}
 _PACKAGE = "package://"
 _REMOTE = ("http://", "https://", "ftp://")
-#: Where the windows of rosglass itself are, whose program registers the types that they use.
+#: Folder of rosglass's own windows, whose program registers the types that they use.
 _OWN = Path(__file__).parents[2] / "scene/app/panels"
 
 
@@ -285,7 +285,7 @@ def install(
     Raises:
         Error: The engine already has a session.
     """
-    # Qt waits 5 ms before drawing, to collect further changes: a third of the time that a picture
+    # Qt waits 5 ms before drawing, to collect further changes: a third of the time that an image
     # takes from the robot to the screen.
     os.environ.setdefault("QT_QPA_UPDATE_IDLE_TIME", "0")
     if not own_window:

@@ -1,6 +1,6 @@
 """Choice of Qt Quick's renderer: OpenGL, or Qt's software renderer.
 
-Qt chooses one for the whole process when the first window or picture of Qt Quick is created. By
+Qt chooses one for the whole process when the first window or image of Qt Quick is created. By
 then, only the files show what needs OpenGL. Where OpenGL runs on the CPU, Qt's software renderer is
 several times as fast.
 """
@@ -46,7 +46,7 @@ _CLASSES = {
     "QQuickFramebufferObject": "QQuickFramebufferObject",
 }
 #: QML that needs OpenGL. The software renderer draws robots' cameras, but nothing else that a
-#: VideoOutput shows; with it, ImagePublisher's pictures of items have no transparency.
+#: VideoOutput shows; with it, ImagePublisher's grabs of items have no transparency.
 _WRITTEN = re.compile(
     r"\b(ShaderEffect|ShaderEffectSource|MultiEffect|RectangularShadow|View3D|WebEngineView|layer"
     r"|MediaPlayer|Video|Camera|CaptureSession|ImagePublisher)\s*\{"
@@ -210,7 +210,7 @@ _BEFORE = "something of Qt Quick that was made before has chosen it"
 class RendererChoice:
     """The process's choice of a renderer, made for its first QML interface."""
 
-    #: What is drawn, and what error messages refer users to.
+    #: The drawn thing in messages, and the class that errors refer users to.
     _subject = "interfaces"
     _application = "rosglass.qml.Application"
     _log = logging.getLogger("rosglass.qml")
@@ -275,14 +275,14 @@ class RendererChoice:
             if self.renderer == "opengl":
                 self._try_opengl()
             if self.renderer == "software":
-                # No render thread: it would need the GIL to paint pictures, while the GUI thread
+                # No render thread: it would need the GIL to paint images, while the GUI thread
                 # holds the GIL and waits for it, a deadlock.
                 os.environ["QSG_RENDER_LOOP"] = "basic"
             name = _NAMES[self.renderer]
             self._log.info("%s are drawn by %s: %s", self._subject, name, self.reason)
         return self.renderer
 
-    def tell_missing(self, need: str) -> str:
+    def missing_warning(self, need: str) -> str:
         """Return the warning for an interface that needs OpenGL, with the software renderer."""
         return (
             f"{need} is not drawn, or wrongly: Qt's software renderer draws all {self._subject} "

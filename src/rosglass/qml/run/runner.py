@@ -176,7 +176,7 @@ class Runner(QtCore.QObject):
         self._notice = ErrorView(self._live, PANEL)
         #: Whether the interface did not call init(), so that the line to add is shown.
         self._without_node = False
-        self._live.script_ended.connect(self._tell_script_ended)
+        self._live.script_ended.connect(self._show_script_ended)
         self._kiosk: Kiosk | None = None
         app: Any = QtCore.QCoreApplication.instance()
         if kiosk and app is not None:
@@ -324,10 +324,10 @@ class Runner(QtCore.QObject):
             if self._kiosk is not None:
                 self._kiosk.keep(window)
         if isinstance(root, QtQuick.QQuickItem):
-            self._tell_not_drawn([root])
+            self._warn_not_drawn([root])
         else:
             windows = {id(w): w for w in (*wanted, *others)}.values()
-            self._tell_not_drawn([window.contentItem() for window in windows])
+            self._warn_not_drawn([window.contentItem() for window in windows])
         for window in wanted:
             if self._fullscreen:
                 window.showFullScreen()
@@ -375,10 +375,10 @@ class Runner(QtCore.QObject):
         self._errors.show(text, self.windows(), heading)
 
     @Slot(str)
-    def _tell_script_ended(self, text: str) -> None:
+    def _show_script_ended(self, text: str) -> None:
         self._notice.show(text, self.windows(), SCRIPT_ENDED)
 
-    def _tell_not_drawn(self, items: Sequence[QtQuick.QQuickItem]) -> None:
+    def _warn_not_drawn(self, items: Sequence[QtQuick.QQuickItem]) -> None:
         """Warn of items that only OpenGL can draw, which a reload may have added."""
         if choice.renderer != "software":
             return
@@ -386,7 +386,7 @@ class Runner(QtCore.QObject):
         # Videos and grabs of items are not items, so search the file, too.
         for need in needs or [need_in_file(self.file, self.engine.importPathList())]:
             if need:
-                _log.warning("%s", choice.tell_missing(need))
+                _log.warning("%s", choice.missing_warning(need))
 
     def _no_graphics(self, error: Any, message: str) -> None:  # noqa: ARG002 - Qt's signature
         _log.error("the window cannot be drawn: %s; try --renderer software", message)
