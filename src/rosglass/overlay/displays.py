@@ -57,7 +57,7 @@ class Display(Plugin):
 
     @property
     def enabled(self) -> bool:
-        """Whether it is shown.
+        """True while the display is shown.
 
         Raises:
             Error: When setting it: the display was removed.

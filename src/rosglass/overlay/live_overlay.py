@@ -127,12 +127,12 @@ class LiveOverlay(Overlay):
 
     @property
     def loaded(self) -> bool:
-        """Whether it shows the file, in its current or its last valid version."""
+        """True while it shows the file, in its current or its last valid version."""
         return self._root is not None
 
     @property
     def watch(self) -> bool:
-        """Whether it reloads when a file is saved."""
+        """True if it reloads when a file is saved."""
         return self._live.watch
 
     @watch.setter

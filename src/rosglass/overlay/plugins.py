@@ -23,16 +23,16 @@ class Plugin:
 
     Args:
         owner: The list.
-        handle: What the 3D view has.
+        handle: The 3D view's own object.
         class_id: RViz's class id, e.g. ``rviz/Grid``; not unique.
     """
 
-    #: What :meth:`require` says after removal.
+    #: The reason in the error of :meth:`require` after removal.
     _REMOVED = "was removed"
 
     def __init__(self, owner: Any, handle: Any, class_id: str) -> None:
         self._owner = owner
-        #: What the 3D view has; None after removal.
+        #: The 3D view's own object; None after removal.
         self.handle: Any = handle
         self.class_id = class_id
         self._state = self._read()
@@ -51,7 +51,7 @@ class Plugin:
 
     @property
     def exists(self) -> bool:
-        """Whether it was not removed."""
+        """True until it is removed."""
         return self.handle is not None
 
     def remove(self) -> None:
@@ -87,7 +87,7 @@ class PluginList(QtCore.QObject):
     removed = Signal(object)
     #: An item has changed. Argument: the item.
     changed = Signal(object)
-    #: What an item is called in errors, and a class id as an example.
+    #: The word for an item in errors, and a class id as an example.
     NOUN = EXAMPLE = ""
 
     def __init__(self) -> None:
@@ -139,7 +139,7 @@ class PluginList(QtCore.QObject):
         raise NotImplementedError(f"{type(self).__name__} must implement _create()")
 
     def _key(self, handle: Any) -> int:
-        """Return what tells a handle from all others that exist."""
+        """Return a key that is unique among the existing handles."""
         return id(handle)
 
     def _sync_items(self) -> None:

@@ -51,7 +51,7 @@ __all__ = ["ACCESS", "RvizObject"]
 ACCESS = "3D view"
 #: Name of the image provider of icons, after ``image://``.
 _ICONS = "rviz_tool_icons"
-#: What an object `rviz` has for one engine.
+#: The attributes of an object `rviz` that belong to one engine.
 _PARTS = ("runtime", "_engine", "_icons", "tool_manager", "display_wrappers", "camera")
 #: Default and maximum size of an icon in pixels.
 _ICON_SIZE, _MAX_ICON_SIZE = 48, 1024
@@ -429,7 +429,7 @@ class RvizObject(RegisteredProperties):
         self, overlay: Overlay, engine: QtQml.QQmlEngine, access: Access | None = None
     ) -> None:
         super().__init__()
-        #: What belongs to engines other than the present one, while a file is reloaded.
+        #: The attributes of other engines than the present one, while a file is reloaded.
         self._others: dict[int, dict[str, Any]] = {}
         self._follows_status = False
         self.serve(engine)
@@ -577,7 +577,7 @@ class RvizObject(RegisteredProperties):
 
     @slot(1, file=_file_path("to save to"), window=boolean("window"))
     def screenshot(self, file: str, window: bool = False) -> None:
-        """Save a picture of the 3D view with its overlays, or of the whole window if `window`."""
+        """Save a screenshot of the 3D view with overlays, or of the whole window if `window`."""
         self.access.picker.screenshot(file, window=window)
 
     #: Load a ``.rviz`` file after the calling function has returned. Discards unsaved changes, and

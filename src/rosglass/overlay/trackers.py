@@ -79,7 +79,7 @@ class Frames(QtCore.QObject):
 
     @property
     def is_simulated(self) -> bool:
-        """Whether the robot's time is that of a simulation or a recording."""
+        """True if the robot's time is that of a simulation or a recording."""
         return self._node is not None and self._node.has_simulated_stamps
 
     def locate(self, frame: str, time: Time | None = None) -> Transform:
@@ -198,7 +198,7 @@ class Tracker(QtCore.QObject):
 
     @property
     def follows_frame(self) -> bool:
-        """Whether it moves with a frame of the robot."""
+        """True if it moves with a frame of the robot."""
         return bool(self._frame)
 
     def update(self) -> None:

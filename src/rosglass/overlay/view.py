@@ -251,7 +251,7 @@ class View(QtCore.QObject):
 
     @property
     def is_moving(self) -> bool:
-        """Whether an animated movement is in progress."""
+        """True during an animated movement."""
         return self._movement is not None
 
     @property

@@ -218,7 +218,7 @@ class ViewServices(QtCore.QObject):
 
     @property
     def is_open(self) -> bool:
-        """Whether topics or services are available."""
+        """True while topics or services are available."""
         return bool(self._handles)
 
     def close(self) -> None:

@@ -98,7 +98,7 @@ class RvizAccess(Access):
 
     @property
     def fullscreen(self) -> bool:
-        """Whether RViz fills the screen."""
+        """True while RViz fills the screen."""
         return self.window.fullscreen
 
     @fullscreen.setter
@@ -107,7 +107,7 @@ class RvizAccess(Access):
 
     @property
     def bare(self) -> bool:
-        """Whether RViz's window shows only the 3D view."""
+        """True while RViz's window shows only the 3D view."""
         return self.window.bare.on
 
     @bare.setter

@@ -312,10 +312,10 @@ class Application(Handle):
         self.session.executor.post(lambda: QtCore.QCoreApplication.exit(code))
 
     def screenshot(self, file: str | os.PathLike[str]) -> None:
-        """Save a picture of RViz's window, including 3D view and overlays.
+        """Save a screenshot of RViz's window, including 3D view and overlays.
 
         Args:
-            file: The picture file; its suffix determines the format, e.g. PNG or JPEG.
+            file: The image file; its suffix determines the format, e.g. PNG or JPEG.
 
         Raises:
             Error: The window is not shown, or the file cannot be written.

@@ -1,4 +1,4 @@
-"""Projection of points into RViz's 3D view and back, and pictures of the view."""
+"""Projection of points into RViz's 3D view and back, and screenshots of the view."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _point(point: Sequence[float]) -> NDArray[np.float64]:
 
 
 class RvizPicker(Picker):
-    """Picks points and takes pictures by redrawing RViz's view, which takes milliseconds."""
+    """Picks points and takes screenshots by redrawing RViz's view, which takes milliseconds."""
 
     def __init__(self, window: Window) -> None:
         self._window = window
@@ -156,7 +156,7 @@ class RvizPicker(Picker):
         return RvizCamera(self._window).unproject(seen_x, seen_y, depth)
 
     def picture(self) -> Any:
-        """Return a picture of the 3D view with its overlays, a ``QImage``.
+        """Return an image of the 3D view with its overlays, a ``QImage``.
 
         Raises:
             Error: The view cannot be drawn now.
@@ -169,10 +169,10 @@ class RvizPicker(Picker):
         return image.copy()
 
     def window_picture(self) -> Any:
-        """Return a picture of RViz's window."""
+        """Return an image of RViz's window."""
         widget = self._window.widget
         grabbed = widget.grab().toImage()
-        # Qt's picture does not contain what Ogre draws.
+        # Qt's image does not contain what Ogre draws.
         at = self._window.panel.mapTo(widget, self._window.panel.rect().topLeft())
         painter = QtGui.QPainter(grabbed)
         view = self.picture()

@@ -27,7 +27,7 @@ __all__ = ["RvizDisplays"]
 
 #: Milliseconds between checks for changes that RViz does not signal.
 _PERIOD_MS = 200
-#: Of a path in errors.
+#: Length to which paths are cut in errors.
 _MAX_SHOWN = 120
 _SIGNALS = ("displayAdded(rviz::Display*)", "displayRemoved(rviz::Display*)")
 

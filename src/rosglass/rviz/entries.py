@@ -212,12 +212,12 @@ class Entry(QtCore.QObject):
 
     @property
     def is_qml(self) -> bool:
-        """Whether the overlay is a QML file."""
+        """True if the overlay is a QML file."""
         return self.class_id in _QML
 
     @property
     def alive(self) -> bool:
-        """Whether RViz has not deleted the display."""
+        """True until RViz deletes the display."""
         return not pyqt("sip").isdeleted(self.display)
 
     @property
@@ -279,12 +279,12 @@ class Entry(QtCore.QObject):
 
     @property
     def is_waiting(self) -> bool:
-        """Whether it has no overlay because of an error or a missing Path."""
+        """True while it has no overlay because of an error or a missing Path."""
         return self.overlay is None and (bool(self._failed) or (self.is_qml and not self.file))
 
     @property
     def is_outdated(self) -> bool:
-        """Whether its overlay shows a file other than Path."""
+        """True while its overlay shows a file other than Path."""
         return self.overlay is not None and self.file != self._loaded_file
 
     def shows(self, file: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Display of an overlay's picture over RViz's 3D view, by panels of an Ogre overlay."""
+"""Shows an overlay's frame over RViz's 3D view, by panels of an Ogre overlay."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ _PANEL_COST_PIXELS = 2000
 _MAX_EXTRA_TILES = 128
 #: Draws the texture only; OpenGL's fixed pipeline would add the specular colour that Ogre enables.
 _SHADER = """#version 120
-uniform sampler2D picture;
-void main() { gl_FragColor = texture2D(picture, gl_TexCoord[0].st); }
+uniform sampler2D frame;
+void main() { gl_FragColor = texture2D(frame, gl_TexCoord[0].st); }
 """
 
 
@@ -100,12 +100,12 @@ class Layer:
     def update(
         self, pixels: NDArray[np.uint32], within: Iterable[tuple[int, int, int, int]] | None = None
     ) -> list[Rect]:
-        """Show a picture.
+        """Show a frame.
 
         Args:
             pixels: Array of the view's shape (height, width), each pixel 0xAARRGGBB with
                 premultiplied colours.
-            within: Rectangles that may have changed; None for the whole picture.
+            within: Rectangles that may have changed; None for the whole frame.
 
         Returns:
             The rectangles that have changed and were uploaded to the graphics card.
@@ -284,7 +284,7 @@ class Work(NamedTuple):
     render: float = 0.0
     #: Reading pixels back from OpenGL.
     read_back: float = 0.0
-    #: Comparing with the previous picture, and arranging panels.
+    #: Comparing with the previous frame, and arranging panels.
     compare: float = 0.0
     #: Uploading changes to the graphics card.
     upload: float = 0.0
@@ -314,7 +314,7 @@ class Drawing:
 
     @property
     def shown(self) -> bool:
-        """Whether the overlay is visible."""
+        """True while the overlay is visible."""
         return self.overlay.visible and self.overlay.opacity > 0
 
     def before_frame(self, width: int, height: int, ratio: float) -> Work | None:

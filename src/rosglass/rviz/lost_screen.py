@@ -78,7 +78,7 @@ class _Connection:
 
     @property
     def is_broken(self) -> bool:
-        """Whether the X server has closed the connection."""
+        """True once the X server has closed the connection."""
         return bool(self._xcb.xcb_connection_has_error(self._ptr))
 
     def watch(self, window: int) -> None:

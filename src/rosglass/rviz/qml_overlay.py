@@ -70,7 +70,7 @@ class Scene(QtCore.QObject):
     """An offscreen Qt Quick window, drawn on request.
 
     The window's size is in units of the interface, so that popups and `Window` know the available
-    space. The scene is scaled rather than its picture, so that text is sharp at any scale.
+    space. The scene is scaled rather than its frame, so that text is sharp at any scale.
     """
 
     #: The scene has to be drawn again.
@@ -112,7 +112,7 @@ class Scene(QtCore.QObject):
         """Set the size.
 
         Args:
-            width: Width of the picture in pixels.
+            width: Width of the frame in pixels.
             height: Its height in pixels.
             ratio: Pixels per unit.
         """
@@ -127,7 +127,7 @@ class Scene(QtCore.QObject):
             self._item.setSize(self._units)
 
     def draw(self) -> NDArray[np.uint32]:
-        """Return the rendered picture.
+        """Return the rendered frame.
 
         Returns:
             Array of shape (height, width), each pixel 0xAARRGGBB with premultiplied colours; valid
@@ -135,9 +135,9 @@ class Scene(QtCore.QObject):
         """
         return self.renderer.draw()
 
-    def release_picture(self) -> None:
-        """Release the memory of the last picture."""
-        self.renderer.release_picture()
+    def release_frame(self) -> None:
+        """Release the memory of the last frame."""
+        self.renderer.release_frame()
 
     def close(self) -> None:
         """Delete the window after the current event; safe to call twice."""
@@ -409,7 +409,7 @@ class QmlOverlay(QmlInput, LiveOverlay):
         UnsupportedError: Neither OpenGL nor Qt's software renderer is available.
     """
 
-    #: What of the file the renderer cannot draw.
+    #: The warning about a part of the file that the renderer cannot draw.
     _undrawable = ""
 
     def __init__(
@@ -446,8 +446,8 @@ class QmlOverlay(QmlInput, LiveOverlay):
         return self._undrawable
 
     def _on_idle(self) -> None:
-        """Release the picture, and warn of items created since that the renderer cannot draw."""
-        self._scene.release_picture()
+        """Release the frame, and warn of items created since that the renderer cannot draw."""
+        self._scene.release_frame()
         if not self._undrawable and is_alive(self._window):
             self._warn_not_drawn(self._window.contentItem())
 

@@ -178,7 +178,7 @@ class Renderer(Protocol):
         """Set the size.
 
         Args:
-            width: Width of the picture in pixels.
+            width: Width of the frame in pixels.
             height: Its height in pixels.
             ratio: Pixels per unit of the interface.
 
@@ -187,10 +187,10 @@ class Renderer(Protocol):
         """
 
     def draw(self) -> NDArray[np.uint32]:
-        """Return the rendered picture; see :meth:`Scene.draw`."""
+        """Return the rendered frame; see :meth:`Scene.draw`."""
 
-    def release_picture(self) -> None:
-        """Release the memory of the last picture."""
+    def release_frame(self) -> None:
+        """Release the memory of the last frame."""
 
     def stop(self) -> None:
         """Release all resources."""
@@ -258,8 +258,8 @@ class OpenGLRenderer:
             self.read_back = time.perf_counter() - started
         return self._pixels[::-1]
 
-    def release_picture(self) -> None:
-        """Release the memory of the last picture."""
+    def release_frame(self) -> None:
+        """Release the memory of the last frame."""
         self._pixels = None
 
     def stop(self) -> None:
@@ -312,7 +312,7 @@ class SoftwareRenderer:
 
     @contextmanager
     def _in_pixels(self) -> Iterator[None]:
-        """Resize the window to the size of its picture, to which Qt limits drawing."""
+        """Resize the window to the size of its frame, to which Qt limits drawing."""
         if self._units == self._pixels:
             yield
             return
@@ -325,8 +325,8 @@ class SoftwareRenderer:
             self._window.resize(self._units)
             self._window.blockSignals(blocked)
 
-    def release_picture(self) -> None:
-        """Release the memory of the last picture."""
+    def release_frame(self) -> None:
+        """Release the memory of the last frame."""
         self._image = None
 
     def stop(self) -> None:

@@ -1,4 +1,4 @@
-"""Covers the non-empty or changed parts of a picture with few rectangles, to save blending."""
+"""Covers the non-empty or changed parts of a frame with few rectangles, to save blending."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Rect(NamedTuple):
 
 
 def covered_tiles(pixels: NDArray[np.uint32]) -> NDArray[np.bool_]:
-    """Return for each tile of a picture whether it has a visible pixel.
+    """Return for each tile of a frame whether it has a visible pixel.
 
     Args:
         pixels: Array of shape (height, width), each pixel 0xAARRGGBB with premultiplied colours;
@@ -83,7 +83,7 @@ def covered_tiles(pixels: NDArray[np.uint32]) -> NDArray[np.bool_]:
 def update_covered(
     covered: NDArray[np.bool_], pixels: NDArray[np.uint32], rects: list[Rect]
 ) -> None:
-    """Update a result of :func:`covered_tiles` for the changed rectangles of the picture."""
+    """Update a result of :func:`covered_tiles` for the changed rectangles of the frame."""
     for first, last in {(rect.top // TILE, -(-rect.bottom // TILE)) for rect in rects}:
         covered[first:last] = covered_tiles(pixels[first * TILE : last * TILE])
 
@@ -93,12 +93,12 @@ def changed_tiles(
     before: NDArray[np.uint32],
     within: Iterable[tuple[int, int, int, int]] | None = None,
 ) -> NDArray[np.bool_]:
-    """Return for each tile whether two pictures of the same size differ in it.
+    """Return for each tile whether two frames of the same size differ in it.
 
     Args:
-        pixels: The new picture.
-        before: The old picture.
-        within: Rectangles to compare; None for the whole pictures.
+        pixels: The new frame.
+        before: The old frame.
+        within: Rectangles to compare; None for the whole frames.
     """
     height, width = pixels.shape
     tiles = np.zeros((-(-height // TILE), -(-width // TILE)), np.bool_)
@@ -114,7 +114,7 @@ def changed_tiles(
         return tiles
     for top in range(0, height, _ROWS_AT_A_TIME):
         now, then = pixels[top : top + _ROWS_AT_A_TIME], before[top : top + _ROWS_AT_A_TIME]
-        # Checking for equality is faster, and most of a picture does not change.
+        # Checking for equality is faster, and most of a frame does not change.
         if (now != then).any():
             tiles[top // TILE : -(-(top + _ROWS_AT_A_TIME) // TILE)] = covered_tiles(now ^ then)
     return tiles
@@ -127,7 +127,7 @@ def cover(
 
     Args:
         tiles: From :func:`covered_tiles` or :func:`changed_tiles`.
-        width: Width of the picture in pixels, which limits the rectangles.
+        width: Width of the frame in pixels, which limits the rectangles.
         height: Its height in pixels.
         most: Maximum number of rectangles; coarser ones are used to keep it.
         worth: Pixels that may be covered in addition to save one rectangle.

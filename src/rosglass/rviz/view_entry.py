@@ -70,7 +70,7 @@ class _PanelEntry:
 
     @property
     def alive(self) -> bool:
-        """Whether RViz has not deleted the display."""
+        """True until RViz deletes the display."""
         return not pyqt("sip").isdeleted(self.display)
 
     def save(self, config: Any) -> None:
@@ -129,7 +129,7 @@ class ViewEntry(QtCore.QObject):
 
     @property
     def shown(self) -> bool:
-        """Whether the panel has an entry; setting it adds or removes one."""
+        """True while the panel has an entry; setting it adds or removes one."""
         return bool(self._shown)
 
     @shown.setter

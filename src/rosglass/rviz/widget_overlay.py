@@ -49,7 +49,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
     def __init__(self, scene: Any, root: Any) -> None:
         super().__init__(scene)
         self._root = root
-        #: The picture: array of shape (height, width), each pixel 0xAARRGGBB with premultiplied
+        #: The frame: array of shape (height, width), each pixel 0xAARRGGBB with premultiplied
         #: colours.
         self.pixels: NDArray[np.uint32] = np.zeros((0, 0), np.uint32)
         self._stale = QtGui.QRegion()

@@ -55,7 +55,7 @@ class BareView(QtCore.QObject):
 
     @property
     def on(self) -> bool:
-        """Whether only the 3D view is shown."""
+        """True while only the 3D view is shown."""
         return self._on
 
     @on.setter
@@ -213,7 +213,7 @@ class Window(QtCore.QObject):
 
     @property
     def modified(self) -> bool:
-        """Whether there are unsaved changes."""
+        """True while there are unsaved changes."""
         return bool(self.widget.isWindowModified())
 
     def load_config(self, config: str | os.PathLike[str]) -> None:
@@ -257,7 +257,7 @@ class Window(QtCore.QObject):
 
     @property
     def fullscreen(self) -> bool:
-        """Whether RViz fills the screen, without its menus and tool bars."""
+        """True while RViz fills the screen, without its menus and tool bars."""
         return bool(self.widget.isFullScreen())
 
     @fullscreen.setter
