@@ -1,8 +1,9 @@
 """Run by test_video_output.py on a virtual screen: shows pictures and prints what pixels became.
 
 Arguments: a QML file with an object called "camera", and names of encodings. Prints a JSON object
-per encoding: the colours in the middle of the picture's four quarters; and the implicit size of the
-VideoOutput, with a picture and after the signal was lost.
+per encoding: the colours in the middle of the picture's four quarters, each encoding's turned on by
+one from those of the encoding before; and the implicit size of the VideoOutput, with a picture and
+after the signal was lost.
 """
 
 from __future__ import annotations
@@ -31,16 +32,16 @@ if TYPE_CHECKING:
 QUARTERS = [(220, 30, 30), (30, 200, 40), (40, 50, 230), (230, 220, 60)]
 
 
-def scene() -> np.ndarray:
+def scene(turn: int) -> np.ndarray:
     picture = np.empty((48, 64, 3), np.uint8)
-    for index, colour in enumerate(QUARTERS):
+    for index, colour in enumerate(QUARTERS[turn:] + QUARTERS[:turn]):
         row, column = divmod(index, 2)
         picture[24 * row : 24 * row + 24, 32 * column : 32 * column + 32] = colour
     return picture
 
 
-def message(encoding: str) -> dict[str, Any]:
-    rgb = scene()
+def message(encoding: str, turn: int) -> dict[str, Any]:
+    rgb = scene(turn)
     grey = rgb[..., 0].copy()
     yuv = cv2.cvtColor(rgb, cv2.COLOR_RGB2YUV_I420).reshape(-1)
     luma, chroma = yuv[: 48 * 64].reshape(48, 64), yuv[48 * 64 :].reshape(2, 24, 32)
@@ -88,18 +89,29 @@ def main() -> None:
     view.show()
     sub = view.rootObject().findChild(QtCore.QObject, "camera")
 
-    def turn(seconds: float) -> None:
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            app.processEvents()
-            time.sleep(0.002)
-
     def until(condition: Callable[[], bool]) -> None:
         end = time.monotonic() + 30
         while not condition():
-            assert time.monotonic() < end, sub.property("problem")
-            turn(0.05)
-        turn(0.2)
+            assert time.monotonic() < end, (sub.property("encoding"), sub.property("problem"))
+            app.processEvents()
+            time.sleep(0.005)
+
+    def colours() -> list[tuple[int, ...]]:
+        shot = view.grabWindow()
+        places = [(80, 60), (240, 60), (80, 180), (240, 180)]
+        return [shot.pixelColor(x, y).getRgb()[:3] for x, y in places]
+
+    def others_than(last: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
+        """Wait until all four colours are others, and return them."""
+        seen = last
+
+        def differ() -> bool:
+            nonlocal seen
+            seen = colours()
+            return not any(np.allclose(*pair, atol=8) for pair in zip(seen, last, strict=True))
+
+        until(differ)
+        return seen
 
     def tell_size(when: str) -> None:
         for item in view.rootObject().childItems():
@@ -108,17 +120,17 @@ def main() -> None:
                 print(json.dumps({"encoding": when, "seen": size}), flush=True)
 
     until(lambda: sub.property("subscribed"))
-    for encoding in encodings:
-        camera.publish(message(encoding))
+    sub.setProperty("timeout", 60_000)  # none is blank before it is looked at
+    seen = colours()
+    for turn, encoding in enumerate(encodings):
+        camera.publish(message(encoding, turn % 4))
         until(lambda encoding=encoding: sub.property("encoding") == encoding)
-        shot = view.grabWindow()
-        places = [(80, 60), (240, 60), (80, 180), (240, 180)]
-        seen = [shot.pixelColor(x, y).getRgb()[:3] for x, y in places]
+        seen = others_than(seen)
         print(json.dumps({"encoding": encoding, "seen": seen}), flush=True)
     tell_size("size with a picture")
+    sub.setProperty("timeout", 100)
     until(lambda: sub.property("stale"))
-    blank = view.grabWindow().pixelColor(80, 60).getRgb()[:3]
-    print(json.dumps({"encoding": "timeout", "seen": [blank] * 4}), flush=True)
+    print(json.dumps({"encoding": "timeout", "seen": others_than(seen)}), flush=True)
     tell_size("size without")
     view.close()
     session.close()
