@@ -279,12 +279,12 @@ class View:
 
         import rosglass.scene
         from rosglass.qml import Session, install
-        from rosglass.scene.displays import display, marker
+        from rosglass.scene.displays import marker, message_queue, topic_display
         from rosglass.scene.render import renderer
 
         self.costs = Costs()
-        self.costs.watch(display.MessageQueue, "receive", "node")
-        self.costs.watch(display.TopicDisplay, "_on_items", "gui")
+        self.costs.watch(message_queue.MessageQueue, "receive", "node")
+        self.costs.watch(topic_display.TopicDisplay, "_on_items", "gui")
         self.costs.watch(marker.MarkerGroup, "flush", "gui")
         for kind in renderer._KINDS.values():
             self.costs.watch(kind, "upload", "gui")

@@ -17,19 +17,10 @@ from qt_waiting import QtWaiting
 
 from conftest import SceneBench
 from rosglass.demo.processes import VirtualScreen
-from rosglass.scene.render.drawing import (
-    BOX,
-    SPHERE,
-    Coloring,
-    Drawable,
-    Group,
-    Labels,
-    Lines,
-    MapImage,
-    Mesh,
-    Points,
-    instance_matrix,
-)
+from rosglass.scene.render.drawing import Coloring, Labels, Lines, MapImage, Mesh, Points
+from rosglass.scene.render.matrices import instance_matrix
+from rosglass.scene.render.mesh_shapes import BOX, SPHERE
+from rosglass.scene.render.scene_tree import Drawable, Group
 
 #: Where each drawable is picked: in none of the middles, so that a mirrored picture differs.
 PLACE = (1.0, -2.0, 0.5)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pytest
 
-from rosglass.scene.render.drawing import CONE, Lines, Mesh
+from rosglass.scene.render.drawing import Lines, Mesh
+from rosglass.scene.render.mesh_shapes import CONE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -360,7 +361,7 @@ def test_states_at_a_high_rate_are_drawn_30_times_per_second(
 def test_joint_states_that_stop_fade(
     bench: SceneBench, robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.scene.displays import display as module
+    from rosglass.scene.displays import topic_display as module
 
     monkeypatch.setattr(module, "_CONTINUOUS_S", 0.5)
     display = add(bench, robot)

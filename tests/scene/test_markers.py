@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from inside import ask_again_after, device_of, renderers_of
 
-from rosglass.scene.render.drawing import BOX, CYLINDER, SPHERE, Labels, Lines, Mesh, Points, Shape
+from rosglass.scene.render.drawing import Labels, Lines, Mesh, Points
+from rosglass.scene.render.mesh_shapes import BOX, CYLINDER, SPHERE, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -591,7 +591,7 @@ def test_color_images_that_stop_are_an_error(bench: SceneBench) -> None:
 
 
 def test_depth_images_that_stop_fade(bench: SceneBench, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rosglass.scene.displays import display as module
+    from rosglass.scene.displays import topic_display as module
 
     monkeypatch.setattr(module, "_CONTINUOUS_S", 0.5)
     camera = Camera(bench)

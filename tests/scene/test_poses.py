@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from rosglass.scene.render.drawing import CONE, CYLINDER, SPHERE, Lines, Mesh
+from rosglass.scene.render.drawing import Lines, Mesh
+from rosglass.scene.render.mesh_shapes import CONE, CYLINDER, SPHERE
 
 if TYPE_CHECKING:
     from collections.abc import Callable

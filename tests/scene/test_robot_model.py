@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from inside import ask_again_after
 
-from rosglass.scene.render.drawing import BOX, CYLINDER, SPHERE
+from rosglass.scene.render.mesh_shapes import BOX, CYLINDER, SPHERE
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -506,7 +506,9 @@ def test_made_and_destroyed_many_times(bench: SceneBench) -> None:
 
 
 def test_picking_finds_the_nearest_drawable(bench: SceneBench) -> None:
-    from rosglass.scene.render.drawing import BOX, Mesh, Points, instance_matrix
+    from rosglass.scene.render.drawing import Mesh, Points
+    from rosglass.scene.render.matrices import instance_matrix
+    from rosglass.scene.render.mesh_shapes import BOX
 
     view = bench.load()
     box, cloud = Mesh(BOX), Points()
@@ -1125,7 +1127,9 @@ def test_the_whole_is_drawn_after_a_move_whose_timer_ends_early(
 
 def boxes_in_a_row(count: int) -> list[Any]:
     """Return red boxes beside each other, as drawables of their own."""
-    from rosglass.scene.render.drawing import BOX, Mesh, instance_matrix
+    from rosglass.scene.render.drawing import Mesh
+    from rosglass.scene.render.matrices import instance_matrix
+    from rosglass.scene.render.mesh_shapes import BOX
 
     made = [Mesh(BOX, (1.0, 0.0, 0.0, 1.0), lit=False) for _ in range(count)]
     for number, box in enumerate(made):
@@ -1171,7 +1175,7 @@ def test_displays_upload_what_is_new_in_turns(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass.scene.render import renderer as module
-    from rosglass.scene.render.drawing import Group
+    from rosglass.scene.render.scene_tree import Group
 
     view = bench.load()
     bench.picture()
@@ -1253,7 +1257,9 @@ def test_texts_that_are_taken_away_meanwhile_hide_nothing(
 
 
 def test_texts_are_drawn_between_what_is_translucent_by_their_distance(bench: SceneBench) -> None:
-    from rosglass.scene.render.drawing import BOX, Labels, Mesh, instance_matrix
+    from rosglass.scene.render.drawing import Labels, Mesh
+    from rosglass.scene.render.matrices import instance_matrix
+    from rosglass.scene.render.mesh_shapes import BOX
 
     view = bench.load('view: "TopDownOrtho"')
     red, green, labels = (1.0, 0.0, 0.0, 0.5), (0.0, 1.0, 0.0), Labels()

@@ -33,7 +33,9 @@ def listen(bench: SceneBench, topic: str, message_type: str) -> list[Any]:
 
 
 def add_box(view: Any, position: Any = (0, 0, 0), owner: Any = "box") -> Any:
-    from rosglass.scene.render.drawing import BOX, Mesh, instance_matrix
+    from rosglass.scene.render.drawing import Mesh
+    from rosglass.scene.render.matrices import instance_matrix
+    from rosglass.scene.render.mesh_shapes import BOX
 
     box = Mesh(BOX, (1, 0, 0, 1))
     box.owner = owner
@@ -794,7 +796,8 @@ def test_a_distance_is_measured(bench: SceneBench, hand: Hand) -> None:
 
 
 def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
-    from rosglass.scene.render.drawing import Points, instance_matrix
+    from rosglass.scene.render.drawing import Points
+    from rosglass.scene.render.matrices import instance_matrix
 
     view = bench.load('tool: "Select"; property int count: selection.count')
 
@@ -871,7 +874,7 @@ def test_a_cell_of_a_large_map_is_selected_without_the_others(bench: SceneBench)
 
 
 def test_the_panel_follows_what_is_selected(bench: SceneBench) -> None:
-    from rosglass.scene.render.drawing import instance_matrix
+    from rosglass.scene.render.matrices import instance_matrix
 
     view = bench.load("SelectionPanel { width: 200; height: 300; view: parent }")
     box = add_box(view, owner=view.scene.add("Path", "Way"))

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from inside import endpoint_of, queue_of
 
-from rosglass.scene.render.drawing import CYLINDER, SPHERE, Lines, Mesh
+from rosglass.scene.render.drawing import Lines, Mesh
+from rosglass.scene.render.mesh_shapes import CYLINDER, SPHERE
 
 if TYPE_CHECKING:
     from conftest import SceneBench
@@ -94,7 +95,7 @@ def test_the_status_says_why_nothing_was_received(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     from rosglass.qml.elements import element
-    from rosglass.scene.displays.display import OneTopicDisplay
+    from rosglass.scene.displays.topic_display import OneTopicDisplay
 
     monkeypatch.setattr(element, "NO_PEER_MS", 50)
     scene = bench.load("ImagePanels { view: parent }").scene
@@ -225,7 +226,7 @@ def test_what_waits_for_its_transform_is_all_shown_later(
     bench: SceneBench, monkeypatch: Any
 ) -> None:
     from rosglass import Time
-    from rosglass.scene.displays import display as displays
+    from rosglass.scene.displays import topic_display as displays
     from rosglass.tf import StaticTransformBroadcaster, Transform
 
     view = bench.load()
@@ -274,7 +275,7 @@ def test_what_waits_for_its_transform_is_all_shown_later(
 
 
 def test_bytes_of_what_waits_are_bounded(bench: SceneBench, monkeypatch: Any) -> None:
-    from rosglass.scene.displays import display as displays
+    from rosglass.scene.displays import message_queue, topic_display
 
     view = bench.load()
     display = view.scene.add("PointCloud2", topic="/cloud", decayTime=60.0, depth=100)
@@ -287,7 +288,8 @@ def test_bytes_of_what_waits_are_bounded(bench: SceneBench, monkeypatch: Any) ->
     assert 30 < size < 200
     # Never the newest one.
     for limit, kept in ((3 * size, 3), (size - 1, 1)):
-        monkeypatch.setattr(displays, "_MAX_WAITING_BYTES", limit)
+        for module in (message_queue, topic_display):
+            monkeypatch.setattr(module, "MAX_WAITING_BYTES", limit)
         for _ in range(5):
             publisher.publish(cloud)
         bench.wait(lambda kept=kept: len(display._waiting) == kept)
@@ -383,7 +385,7 @@ def test_obstacles_fade_when_a_sensor_sends_nothing_any_more(
     bench: SceneBench, monkeypatch: Any
 ) -> None:
     from rosglass.comm.qos import QoS
-    from rosglass.scene.displays import display as displays
+    from rosglass.scene.displays import topic_display as displays
 
     monkeypatch.setattr(displays, "_CONTINUOUS_S", 0.5)
     view = bench.load(
@@ -437,7 +439,7 @@ def test_obstacles_fade_when_a_sensor_sends_nothing_any_more(
 def test_what_a_robot_measures_all_the_time_fades_without_a_message(
     bench: SceneBench, monkeypatch: Any, kind: str, message: dict[str, Any]
 ) -> None:
-    from rosglass.scene.displays import display as displays
+    from rosglass.scene.displays import topic_display as displays
 
     monkeypatch.setattr(displays, "_CONTINUOUS_S", 0.5)
     display = bench.load().scene.add(kind, topic="/shown")
@@ -457,8 +459,8 @@ def test_what_a_robot_measures_all_the_time_fades_without_a_message(
 def test_a_sensor_may_send_nothing_while_a_simulation_is_paused(
     bench: SceneBench, monkeypatch: Any
 ) -> None:
-    from rosglass.scene.displays import display as displays
     from rosglass.scene.displays import scene as scenes
+    from rosglass.scene.displays import topic_display as displays
 
     monkeypatch.setattr(displays, "_CONTINUOUS_S", 1.0)
     monkeypatch.setattr(scenes, "_PAUSED_S", 0.3)
@@ -579,7 +581,7 @@ def test_nothing_is_late_while_the_robots_time_stands_still(bench: SceneBench) -
 
 def test_messages_wait_for_the_gui_thread_as_one_job() -> None:
     from rosglass.comm.handle import Executor
-    from rosglass.scene.displays.display import MessageQueue
+    from rosglass.scene.displays.message_queue import MessageQueue
 
     class Waiting(Executor):
         jobs = 0

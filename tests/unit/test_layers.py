@@ -179,7 +179,11 @@ def test_packages_are_attributes() -> None:
 @pytest.mark.parametrize(
     ("module", "name"),
     [
+        ("drawing", "Shape"),
+        ("drawing", "Group"),
         ("drawing", "Points"),
+        ("drawing", "check_numbers"),
+        ("drawing", "instance_matrix"),
         ("meshes", "load_mesh_cached"),
         ("rviz_config", "RvizConfig"),
         ("settings", "Setting"),

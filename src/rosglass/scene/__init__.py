@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from rosglass.scene.configs.settings import Setting
     from rosglass.scene.data.meshes import load_mesh_cached
     from rosglass.scene.data.urdf import parse_urdf
-    from rosglass.scene.displays.display import Display, TopicDisplay
+    from rosglass.scene.displays.display import Display
     from rosglass.scene.displays.scene import Scene
+    from rosglass.scene.displays.topic_display import TopicDisplay
     from rosglass.scene.overlays.scene_overlay import SceneOverlay, add_overlay
     from rosglass.scene.tools.tool import PointerEvent, Tool
     from rosglass.scene.view.scene_view import SceneView
@@ -48,7 +49,7 @@ _HOMES = {
     "SceneView": "view.scene_view",
     "Setting": "configs.settings",
     "Tool": "tools.tool",
-    "TopicDisplay": "displays.display",
+    "TopicDisplay": "displays.topic_display",
     "add_overlay": "overlays.scene_overlay",
     "load_mesh_cached": "data.meshes",
     "parse_urdf": "data.urdf",
@@ -56,11 +57,17 @@ _HOMES = {
 }
 #: Former modules that programs import, and where their names are now.
 _FORMER = {
-    "drawing": "render.drawing",
-    "meshes": "data.meshes",
-    "rviz_config": "configs.rviz_config",
-    "settings": "configs.settings",
-    "urdf": "data.urdf",
+    "drawing": (
+        "render.drawing",
+        "render.scene_tree",
+        "render.mesh_shapes",
+        "render.matrices",
+        "render.arrays",
+    ),
+    "meshes": ("data.meshes",),
+    "rviz_config": ("configs.rviz_config",),
+    "settings": ("configs.settings",),
+    "urdf": ("data.urdf",),
 }
 
 
@@ -77,18 +84,22 @@ def __dir__() -> list[str]:
     return sorted(__all__)
 
 
-def _former_module(name: str, home: str) -> ModuleType:
-    """Return a module whose names are those of another, imported on first use."""
-    module = ModuleType(f"{__name__}.{name}", f"The names of :mod:`{__name__}.{home}`.")
+def _former_module(name: str, homes: tuple[str, ...]) -> ModuleType:
+    """Return a module whose names are those of others, imported on first use."""
+    module = ModuleType(f"{__name__}.{name}", f"The names of {', '.join(homes)}.")
 
     def find(attribute: str) -> object:
         if attribute.startswith("__"):  # which debuggers ask of all modules
             raise AttributeError(attribute)
-        return getattr(import_module(f"{__name__}.{home}"), attribute)
+        for home in homes:
+            found = import_module(f"{__name__}.{home}")
+            if hasattr(found, attribute):
+                return getattr(found, attribute)
+        raise AttributeError(f"module {module.__name__!r} has no attribute {attribute!r}")
 
     vars(module)["__getattr__"] = find
     return module
 
 
-for _name, _home in _FORMER.items():
-    globals()[_name] = sys.modules[f"{__name__}.{_name}"] = _former_module(_name, _home)
+for _name, _homes in _FORMER.items():
+    globals()[_name] = sys.modules[f"{__name__}.{_name}"] = _former_module(_name, _homes)

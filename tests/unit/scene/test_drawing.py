@@ -8,19 +8,10 @@ import numpy as np
 import pytest
 
 from rosglass.errors import Error
-from rosglass.scene.render.drawing import (
-    BOX,
-    CYLINDER,
-    SPHERE,
-    Group,
-    Labels,
-    Lines,
-    MapImage,
-    Mesh,
-    Points,
-    Shape,
-    instance_matrix,
-)
+from rosglass.scene.render.drawing import Labels, Lines, MapImage, Mesh, Points
+from rosglass.scene.render.matrices import instance_matrix
+from rosglass.scene.render.mesh_shapes import BOX, CYLINDER, SPHERE, Shape
+from rosglass.scene.render.scene_tree import Group
 
 POINTS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 0)]
 
@@ -90,7 +81,10 @@ def _add_to_itself() -> None:
         (lambda: Points().set_look(size="x"), "size: expected a finite number, got 'x'"),
         (lambda: Lines("wide"), "width: expected a finite number, got 'wide'"),
         (lambda: Lines().set_look(alpha=np.nan), "alpha: expected a finite number, got nan"),
-        (lambda: Mesh(None), "shape: expected a Shape, such as rosglass.scene.render.drawing.BOX"),
+        (
+            lambda: Mesh(None),
+            "shape: expected a Shape, such as rosglass.scene.drawing.BOX",
+        ),
         (lambda: Mesh(BOX).set_instances([np.eye(4)], (1, 2)), "colors: .* fit the shape"),
         (lambda: Mesh(BOX).set_texture([1, 2]), "texture: expected up to 16384"),
         (lambda: MapImage().set_cells([1, 2], 1.0), "expected up to 16384 x 16384 cells"),

@@ -9,7 +9,9 @@ import numpy as np
 
 from rosglass.scene.displays.marker_batches import _MAX_POINTS as MAX_POINTS
 from rosglass.scene.displays.marker_batches import LineBatch, TextBatch, TriangleBatch
-from rosglass.scene.render.drawing import Labels, Lines, Shape, instance_matrix
+from rosglass.scene.render.drawing import Labels, Lines
+from rosglass.scene.render.matrices import instance_matrix
+from rosglass.scene.render.mesh_shapes import Shape
 
 RED, GREEN = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.5)
 ZIGZAG = np.array([[0, 0, 0], [1, 0, 0], [1, 2, 0], [0, 2, 3]], np.float32)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from rosglass.scene.render.drawing import BOX, Group, Labels, Mesh
+from rosglass.scene.render.drawing import Labels, Mesh
+from rosglass.scene.render.mesh_shapes import BOX
 from rosglass.scene.render.picking import pick
+from rosglass.scene.render.scene_tree import Group
 from rosglass.scene.view_controllers.views import OrbitView
 
 

@@ -15,7 +15,7 @@ from rosglass.interfaces.names import ros1_name
 from rosglass.qml.engine.properties import Writable
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import FIXED_FRAME
-from rosglass.scene.displays.display import OneTopicDisplay
+from rosglass.scene.displays.topic_display import OneTopicDisplay
 from rosglass.scene.view.display_configs import GroupDisplay, UnknownDisplay, duplicate_display
 from rosglass.scene.view.scene_view import SceneView
 

@@ -21,8 +21,9 @@ from rosglass.scene.displays.display import Status
 from rosglass.scene.displays.geometry import HistoryDisplay
 from rosglass.scene.displays.parts import Parts
 from rosglass.scene.displays.robot_model import DescriptionLoader, DescriptionSource
-from rosglass.scene.displays.shapes import rotation_of_z_to
-from rosglass.scene.render.drawing import CONE, Lines, Mesh
+from rosglass.scene.render.drawing import Lines, Mesh
+from rosglass.scene.render.matrices import rotation_of_z_to
+from rosglass.scene.render.mesh_shapes import CONE
 from rosglass.scene.render.point_colors import rainbow
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.data.urdf import Joint
-    from rosglass.scene.render.drawing import Group
+    from rosglass.scene.render.scene_tree import Group
 
 __all__ = ["EffortDisplay"]
 

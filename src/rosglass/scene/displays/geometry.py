@@ -11,22 +11,14 @@ import numpy as np
 
 from rosglass.errors import Error
 from rosglass.scene.configs.settings import Setting, rgb_of
-from rosglass.scene.displays.display import MOST_WAITING, TopicDisplay
-from rosglass.scene.displays.shapes import (
-    ArrowShapes,
-    pose_along,
-    read_columns,
-    rotation_of_z_to,
-)
-from rosglass.scene.render.drawing import (
-    CONE,
-    SPHERE,
-    Group,
-    Lines,
-    Mesh,
-    check_numbers,
-    instance_matrix,
-)
+from rosglass.scene.displays.message_queue import MOST_WAITING
+from rosglass.scene.displays.shapes import ArrowShapes, read_columns
+from rosglass.scene.displays.topic_display import TopicDisplay
+from rosglass.scene.render.arrays import check_numbers
+from rosglass.scene.render.drawing import Lines, Mesh
+from rosglass.scene.render.matrices import instance_matrix, pose_along, rotation_of_z_to
+from rosglass.scene.render.mesh_shapes import CONE, SPHERE
+from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:
     from collections.abc import Callable

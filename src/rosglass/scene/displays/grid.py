@@ -11,7 +11,8 @@ from rosglass.scene.configs.rviz_formats import FIXED_FRAME
 from rosglass.scene.configs.settings import Setting, rgb_of
 from rosglass.scene.displays.display import Display
 from rosglass.scene.displays.shapes import AxesShapes
-from rosglass.scene.render.drawing import Group, Lines
+from rosglass.scene.render.drawing import Lines
+from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:
     from rosglass.qml.engine.runtime import Runtime

@@ -31,13 +31,9 @@ from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import Property, QtCore, QtGui, QtQml, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import read_number
 from rosglass.scene.configs.settings import Setting
-from rosglass.scene.displays.display import (
-    MessageQueue,
-    OneTopicDisplay,
-    Subscriptions,
-    drop_oldest,
-)
+from rosglass.scene.displays.message_queue import MessageQueue, Subscriptions, drop_oldest
 from rosglass.scene.displays.parts import Parts
+from rosglass.scene.displays.topic_display import OneTopicDisplay
 from rosglass.scene.render.camera import PinholeCamera
 from rosglass.scene.view.scene_view import SceneView
 
@@ -53,8 +49,8 @@ if TYPE_CHECKING:
     from rosglass.scene.displays.display import Display
     from rosglass.scene.displays.scene import Scene
     from rosglass.scene.render.camera import Camera
-    from rosglass.scene.render.drawing import Item
     from rosglass.scene.render.renderer import Frame
+    from rosglass.scene.render.scene_tree import Item
 
 __all__ = [
     "CameraDisplay",

@@ -22,13 +22,7 @@ from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QtCore, QtQml, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import read_marker_namespace, write_marker_namespace
 from rosglass.scene.configs.settings import Setting
-from rosglass.scene.displays.display import (
-    OUTDATED_ALPHA,
-    MessageQueue,
-    OneTopicDisplay,
-    TopicDisplay,
-    drop_oldest,
-)
+from rosglass.scene.displays.display import OUTDATED_ALPHA
 from rosglass.scene.displays.interactive_marker_controls import (
     MENU_SELECT,
     Control,
@@ -40,7 +34,9 @@ from rosglass.scene.displays.interactive_marker_messages import (
     read_update,
 )
 from rosglass.scene.displays.marker_meshes import MarkerMeshes
-from rosglass.scene.render.drawing import Group
+from rosglass.scene.displays.message_queue import MessageQueue, drop_oldest
+from rosglass.scene.displays.topic_display import OneTopicDisplay, TopicDisplay
+from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping

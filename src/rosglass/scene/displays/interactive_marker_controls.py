@@ -37,7 +37,9 @@ from rosglass.scene.displays.marker import MarkerGroup
 from rosglass.scene.displays.marker_messages import MESH, MarkerRecord
 from rosglass.scene.displays.shapes import AxesShapes
 from rosglass.scene.render.camera import inverse, quaternion_of
-from rosglass.scene.render.drawing import Group, Lines, instance_matrix
+from rosglass.scene.render.drawing import Lines
+from rosglass.scene.render.matrices import instance_matrix
+from rosglass.scene.render.scene_tree import Group
 from rosglass.scene.view_controllers.events import Button, Modifier
 
 if TYPE_CHECKING:

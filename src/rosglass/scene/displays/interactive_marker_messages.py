@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.scene.displays.display import frame_and_stamp, matrix_of
 from rosglass.scene.displays.marker_messages import (
     ARROW,
     TEXT,
@@ -19,7 +18,9 @@ from rosglass.scene.displays.marker_messages import (
     MarkerRecord,
     read_marker,
 )
-from rosglass.scene.render.drawing import check_numbers, instance_matrix
+from rosglass.scene.displays.message_queue import frame_and_stamp
+from rosglass.scene.render.arrays import check_numbers
+from rosglass.scene.render.matrices import instance_matrix, matrix_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -12,9 +12,11 @@ from rosglass.comm.qos import QoS, Reliability
 from rosglass.errors import Error
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.scene.configs.settings import Setting, rgb_of
-from rosglass.scene.displays.display import TopicDisplay, matrix_of
 from rosglass.scene.displays.shapes import read_columns
-from rosglass.scene.render.drawing import MapImage, Points, are_drawable, check_numbers
+from rosglass.scene.displays.topic_display import TopicDisplay
+from rosglass.scene.render.arrays import are_drawable, check_numbers
+from rosglass.scene.render.drawing import MapImage, Points
+from rosglass.scene.render.matrices import matrix_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

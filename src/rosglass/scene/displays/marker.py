@@ -20,7 +20,7 @@ from rosglass.errors import Error, TransformException
 from rosglass.qml.elements.element import single_shot
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
-from rosglass.scene.displays.display import OUTDATED_ALPHA, Status, TopicDisplay
+from rosglass.scene.displays.display import OUTDATED_ALPHA, Status
 from rosglass.scene.displays.marker_batches import (
     MAX_JOINED_POINTS,
     LineBatch,
@@ -50,16 +50,9 @@ from rosglass.scene.displays.marker_messages import (
     triangles_of,
 )
 from rosglass.scene.displays.parts import Parts
-from rosglass.scene.render.drawing import (
-    OPAQUE,
-    Drawable,
-    Group,
-    Labels,
-    Lines,
-    Mesh,
-    Points,
-    Shape,
-)
+from rosglass.scene.displays.topic_display import TopicDisplay
+from rosglass.scene.render.drawing import OPAQUE, Labels, Lines, Mesh, Points
+from rosglass.scene.render.scene_tree import Drawable, Group
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
@@ -71,6 +64,7 @@ if TYPE_CHECKING:
     from rosglass.qt import QtCore
     from rosglass.scene.data.resource_retriever import ResourceRetriever
     from rosglass.scene.displays.scene import Scene
+    from rosglass.scene.render.mesh_shapes import Shape
 
     Matrix: TypeAlias = NDArray[np.float64]
     _Joint: TypeAlias = LineBatch | TextBatch | TriangleBatch

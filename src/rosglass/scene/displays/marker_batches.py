@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rosglass.scene.render.drawing import Labels, Lines, Mesh, Shape, instance_matrix
+from rosglass.scene.render.drawing import Labels, Lines, Mesh
+from rosglass.scene.render.matrices import instance_matrix
+from rosglass.scene.render.mesh_shapes import Shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,16 +12,13 @@ from rosglass.errors import Error
 from rosglass.scene.data.meshes import ending_of
 from rosglass.scene.displays.marker_messages import MarkerRecord, scale_matrix
 from rosglass.scene.displays.robot_model import STL_ENDINGS, MeshFiles, material_of
-from rosglass.scene.render.drawing import (
-    OPAQUE,
-    Mesh,
-    Shape,
-)
+from rosglass.scene.render.drawing import OPAQUE, Mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
 
     from rosglass.scene.data.resource_retriever import ResourceRetriever
+    from rosglass.scene.render.mesh_shapes import Shape
 
 
 __all__ = ["MarkerMeshes"]

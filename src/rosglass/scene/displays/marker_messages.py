@@ -8,17 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.scene.displays.shapes import poses_matrices
-from rosglass.scene.render.drawing import (
-    BOX,
-    CONE,
-    CYLINDER,
-    OPAQUE,
-    SPHERE,
-    Shape,
-    are_drawable,
-    check_numbers,
-)
+from rosglass.scene.render.arrays import are_drawable, check_numbers
+from rosglass.scene.render.drawing import OPAQUE
+from rosglass.scene.render.matrices import poses_matrices
+from rosglass.scene.render.mesh_shapes import BOX, CONE, CYLINDER, SPHERE, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -31,7 +31,8 @@ from rosglass.scene.data.cloud_sources import (
     cloud_from_point_cloud,
 )
 from rosglass.scene.data.point_clouds import Cloud, CloudHistory, is_ordered, order_points
-from rosglass.scene.displays.display import TopicDisplay, drop_oldest, frame_and_stamp
+from rosglass.scene.displays.message_queue import drop_oldest, frame_and_stamp
+from rosglass.scene.displays.topic_display import TopicDisplay
 from rosglass.scene.render.drawing import Points
 from rosglass.scene.render.point_colors import (
     COLOR_TRANSFORMERS,

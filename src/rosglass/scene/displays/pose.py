@@ -10,16 +10,14 @@ import numpy as np
 
 from rosglass.errors import Error
 from rosglass.scene.configs.settings import Setting, rgb_of
-from rosglass.scene.displays.display import TopicDisplay, matrix_of
 from rosglass.scene.displays.geometry import HistoryDisplay
-from rosglass.scene.displays.shapes import (
-    ALONG,
-    ArrowShapes,
-    AxesShapes,
-    poses_matrices,
-    read_columns,
-)
-from rosglass.scene.render.drawing import CONE, CYLINDER, SPHERE, Group, Lines, Mesh, check_numbers
+from rosglass.scene.displays.shapes import ALONG, ArrowShapes, AxesShapes, read_columns
+from rosglass.scene.displays.topic_display import TopicDisplay
+from rosglass.scene.render.arrays import check_numbers
+from rosglass.scene.render.drawing import Lines, Mesh
+from rosglass.scene.render.matrices import matrix_of, poses_matrices
+from rosglass.scene.render.mesh_shapes import CONE, CYLINDER, SPHERE
+from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

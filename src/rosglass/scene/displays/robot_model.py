@@ -32,16 +32,9 @@ from rosglass.scene.data.urdf import Box, Capsule, Cylinder, MeshFile, Robot, Sp
 from rosglass.scene.displays.display import Display, Status
 from rosglass.scene.displays.parts import Parts
 from rosglass.scene.displays.shapes import AxesShapes
-from rosglass.scene.render.drawing import (
-    BOX,
-    CYLINDER,
-    SPHERE,
-    Group,
-    Lines,
-    Mesh,
-    Shape,
-    move_items,
-)
+from rosglass.scene.render.drawing import Lines, Mesh
+from rosglass.scene.render.mesh_shapes import BOX, CYLINDER, SPHERE, Shape
+from rosglass.scene.render.scene_tree import Group, move_items
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping

@@ -23,8 +23,9 @@ from rosglass.qml.engine.runtime import runtime_of
 from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.scene.displays.display import Display
-from rosglass.scene.displays.shapes import poses_matrices
-from rosglass.scene.render.drawing import Group, are_drawable, instance_matrix
+from rosglass.scene.render.arrays import are_drawable
+from rosglass.scene.render.matrices import instance_matrix, poses_matrices
+from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

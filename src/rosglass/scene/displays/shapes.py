@@ -6,23 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rosglass.scene.render.drawing import CONE, CYLINDER, Group, Mesh
+from rosglass.scene.render.drawing import Mesh
+from rosglass.scene.render.matrices import stack_poses
+from rosglass.scene.render.mesh_shapes import CONE, CYLINDER
+from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from rosglass.messages import MessageSequence
 
-__all__ = [
-    "ALONG",
-    "ArrowShapes",
-    "AxesShapes",
-    "pose_along",
-    "poses_matrices",
-    "read_columns",
-    "rotation_of_z_to",
-    "stack_poses",
-]
+__all__ = ["ALONG", "ArrowShapes", "AxesShapes", "read_columns"]
 
 #: Turns z, along which cylinders and cones stand, to x, y and z.
 ALONG = np.array(
@@ -50,49 +44,6 @@ def read_columns(elements: MessageSequence, *paths: str) -> NDArray[np.float64]:
             column = column[name]
         out[:, number] = column
     return out
-
-
-def stack_poses(poses: Any) -> NDArray[np.float64]:
-    """Return matrices as one array of shape (n, 4, 4), which may be empty."""
-    return np.asarray(poses, np.float64).reshape(-1, 4, 4)
-
-
-def poses_matrices(positions: Any, rotations: Any) -> NDArray[np.float64]:
-    """Return matrices (n, 4, 4) of positions (n, 3) and quaternions x, y, z, w (n, 4).
-
-    A quaternion of length 0 is no rotation, others are normalised, as RViz does it.
-    """
-    at = np.asarray(positions, np.float64).reshape(-1, 3)
-    q = np.asarray(rotations, np.float64).reshape(-1, 4)
-    length = (q**2).sum(axis=1)
-    q = np.where(length[:, np.newaxis] > 0, q, (0.0, 0.0, 0.0, 1.0))
-    x, y, z, w = (q / np.sqrt(np.where(length > 0, length, 1.0))[:, np.newaxis]).T
-    out = np.zeros((len(at), 4, 4))
-    out[:, 0, 0], out[:, 0, 1] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w)
-    out[:, 0, 2], out[:, 1, 0] = 2 * (x * z + y * w), 2 * (x * y + z * w)
-    out[:, 1, 1], out[:, 1, 2] = 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
-    out[:, 2, 0], out[:, 2, 1] = 2 * (x * z - y * w), 2 * (y * z + x * w)
-    out[:, 2, 2], out[:, :3, 3], out[:, 3, 3] = 1 - 2 * (x * x + y * y), at, 1
-    return out
-
-
-def rotation_of_z_to(axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the shortest rotation, 3 x 3, from z to a direction of length 1."""
-    x, y, z = axis.tolist()
-    if z < -1 + 1e-9:
-        return np.diag([1.0, -1.0, -1.0])
-    u, v = x / (1 + z), y / (1 + z)
-    return np.array([[1 - x * u, -x * v, x], [-y * u, 1 - y * v, y], [-x, -y, z]])
-
-
-def pose_along(x: NDArray[np.float64], origin: ArrayLike = (0.0, 0.0, 0.0)) -> NDArray[np.float64]:
-    """Return a pose at a point whose x is along a direction of length 1, 4 x 4."""
-    helper = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    y = np.cross(helper, x)
-    y /= np.linalg.norm(y)
-    pose = np.eye(4)
-    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = x, y, np.cross(x, y), origin
-    return pose
 
 
 def _along(

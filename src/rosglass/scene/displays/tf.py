@@ -16,8 +16,9 @@ from rosglass.qt import QtCore, Signal, Slot
 from rosglass.scene.configs.settings import Setting
 from rosglass.scene.displays.display import OUTDATED_ALPHA, Display
 from rosglass.scene.displays.parts import Parts
-from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, pose_along, stack_poses
+from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes
 from rosglass.scene.render.drawing import Labels
+from rosglass.scene.render.matrices import pose_along, stack_poses
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from PySide6.QtGui import QRhiResourceUpdateBatch
 
-    from rosglass.scene.render.drawing import Shape
+    from rosglass.scene.render.mesh_shapes import Shape
 
 __all__ = [
     "FRAME_BYTES",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rosglass.scene.render.camera import Camera
-    from rosglass.scene.render.drawing import Drawable
+    from rosglass.scene.render.scene_tree import Drawable
 
     _Placed: TypeAlias = tuple[Drawable, NDArray[np.float64], float]
 
@@ -63,7 +63,7 @@ def pick(
     """Return what is nearest to the camera under a place of the picture.
 
     Args:
-        drawables: From :meth:`rosglass.scene.render.drawing.Group.drawables`.
+        drawables: From :meth:`rosglass.scene.render.scene_tree.Group.drawables`.
         camera: The camera of the picture.
         x: Units of the item, from its left edge.
         y: The same, from its upper edge.
@@ -101,7 +101,7 @@ def select(
     """Iterate over what is in a rectangle, hidden or not; of meshes, the middle counts.
 
     Args:
-        drawables: From :meth:`rosglass.scene.render.drawing.Group.drawables`.
+        drawables: From :meth:`rosglass.scene.render.scene_tree.Group.drawables`.
         camera: The camera of the picture.
         corner: x and y, units of the item, from its left and upper edge.
         opposite: The corner across.

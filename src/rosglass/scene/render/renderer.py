@@ -46,7 +46,8 @@ if TYPE_CHECKING:
     from PySide6.QtQuick import QQuickRhiItem
 
     from rosglass.scene.render.camera import Camera
-    from rosglass.scene.render.drawing import Drawable, Item, Shape
+    from rosglass.scene.render.mesh_shapes import Shape
+    from rosglass.scene.render.scene_tree import Drawable, Item
 
     _Drawn: TypeAlias = "_OnDevice | _LabelsPart"
 

@@ -11,8 +11,10 @@ from rosglass.overlay.orbit import Point
 from rosglass.qml.elements.element import single_shot
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.scene.configs.settings import Configurable
-from rosglass.scene.render.drawing import Group, Lines, MapImage, Mesh, Points, instance_matrix
+from rosglass.scene.render.drawing import Lines, MapImage, Mesh, Points
+from rosglass.scene.render.matrices import instance_matrix
 from rosglass.scene.render.picking import Selected, pick, select
+from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rosglass.scene.render.camera import Camera
-    from rosglass.scene.render.drawing import Drawable
+    from rosglass.scene.render.scene_tree import Drawable
 
 __all__ = ["Change", "SelectedPart", "Selection"]
 
@@ -82,7 +84,8 @@ class Selection(QtCore.QObject):
     Args:
         view: The view.
         overlay: Where the boxes are drawn.
-        drawables: Returns what is drawn, see :meth:`rosglass.scene.render.drawing.Group.drawables`.
+        drawables: Returns what is drawn, see
+            :meth:`rosglass.scene.render.scene_tree.Group.drawables`.
         camera: Returns the view's camera.
     """
 

@@ -23,7 +23,7 @@ from rosglass.qt import Property, QtCore, QtGui, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import TOOLS, ros_of, tool_type
 from rosglass.scene.configs.settings import Configurable, Setting
 from rosglass.scene.displays.declared import expect_view, find_view
-from rosglass.scene.render.drawing import Group
+from rosglass.scene.render.scene_tree import Group
 from rosglass.scene.view_controllers.events import Action, Button, Drag, Modifier, Touch, Wheel
 
 if TYPE_CHECKING:

@@ -21,9 +21,12 @@ from rosglass.scene.configs.rviz_formats import FIXED_FRAME, ros_of
 from rosglass.scene.displays.display import Display
 from rosglass.scene.displays.scene import Scene
 from rosglass.scene.render.camera import interpolate
-from rosglass.scene.render.drawing import SPHERE, Group, Mesh, instance_matrix
+from rosglass.scene.render.drawing import Mesh
+from rosglass.scene.render.matrices import instance_matrix
+from rosglass.scene.render.mesh_shapes import SPHERE
 from rosglass.scene.render.picking import pick
 from rosglass.scene.render.renderer import Frame, SceneRenderer
+from rosglass.scene.render.scene_tree import Group
 from rosglass.scene.tools.selection import Selection
 from rosglass.scene.tools.tool import PointerEvent, Tool, Tools
 from rosglass.scene.view.display_configs import (
@@ -45,8 +48,8 @@ if TYPE_CHECKING:
 
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.scene.render.camera import Camera
-    from rosglass.scene.render.drawing import Drawable
     from rosglass.scene.render.picking import Hit
+    from rosglass.scene.render.scene_tree import Drawable
 
 __all__ = ["NO_GPU", "SceneView"]
 
