@@ -44,12 +44,13 @@ if TYPE_CHECKING:
     from rosglass.comm.promise import Promise
     from rosglass.comm.publisher import Publisher
     from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
-    from rosglass.comm.service_client import Call, ServiceClient
+    from rosglass.comm.service_client import ServiceClient
     from rosglass.comm.service_server import Answer, ServiceServer
     from rosglass.comm.statistics import Statistics
     from rosglass.comm.subscription import Subscription
     from rosglass.comm.time import Duration, Time
     from rosglass.comm.timers import Timers, Worker
+    from rosglass.comm.wire import Call
 
 __all__ = [
     "BEST_AVAILABLE",
@@ -193,10 +194,7 @@ _HOMES = {
         "QoS",
         "Reliability",
     ),
-    "service_client": (
-        "Call",
-        "ServiceClient",
-    ),
+    "service_client": ("ServiceClient",),
     "service_server": (
         "Answer",
         "ServiceServer",
@@ -211,6 +209,7 @@ _HOMES = {
         "Timers",
         "Worker",
     ),
+    "wire": ("Call",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import itertools
 import logging
+import threading
 import time
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.client import Client, copy_value
-from rosglass.comm.handle import Handle, check_may_wait
-from rosglass.comm.promise import Promise, check_timeout
+from rosglass.comm.handle import check_may_wait
+from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.service_server import decode_checked, served_by_this_thread
-from rosglass.comm.wire import CALL_DROPPED, SERVER_LEFT
+from rosglass.comm.wire import CALL_DROPPED, SERVER_LEFT, Call, PendingCall, encode_request
 from rosglass.errors import (
     ConnectionLostError,
-    ConversionError,
     DecodeError,
     Error,
     NodeClosedError,
@@ -28,78 +28,66 @@ from rosglass.errors import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from rosglass.comm.core import NodeCore
     from rosglass.comm.qos import QoS
-    from rosglass.comm.wire import OnReply
     from rosglass.messages import Message, ServiceType
 
-__all__ = ["Call", "PendingCall", "ServiceClient", "ServiceRequester"]
+__all__ = ["PendingCalls", "ServiceClient", "ServiceRequester"]
 
 _log = logging.getLogger("rosglass.comm")
 
 
-class Call(Promise["Message"]):
-    """The promise of a service's response.
+class PendingCalls:
+    """The calls of a client that have not ended, in their order; the only table of them.
 
-    ``result(timeout)`` waits for it, ``await call`` does so in asyncio, :meth:`on_done` calls back.
-    ``cancel()`` cancels the call: a request that waits for a server is not sent, and the response
-    to a sent one is ignored (the server is not notified: ROS has no message for that).
+    A request waits in it until the requester takes it to send it.
     """
 
+    def __init__(self) -> None:
+        #: Guards the calls and their flags `waiting`.
+        self._lock = threading.Lock()
+        # Not a dict, whose first item is searched for behind all those that were removed.
+        self._calls: OrderedDict[Call, PendingCall] = OrderedDict()
 
-@dataclass(eq=False, kw_only=True)
-class PendingCall:
-    """A call that has not ended; its client owns it, and enforces its deadline.
+    def __len__(self) -> int:
+        return len(self._calls)
 
-    Attributes:
-        number: Identifies it among the client's calls; ascending.
-        call: The caller's promise.
-        value: The encoded request, or the value to encode while the type is unknown.
-        type: The type it is encoded for; None while that is unknown.
-        max_size: Largest size of a request in bytes; None for no limit.
-        deadline: Monotonic time at which it ends without response; None for no limit.
-        timer: Ends it at its deadline; None in :meth:`ServiceClient.call`, which does so itself.
-        sent: Monotonic time at which its requester sent the request, None before.
-        answered: Whether a reply, or the reason for a missing one, was received.
-        private: Whether the caller waits in :meth:`ServiceClient.call`: its end runs no callback.
-        route: Private data of its requester.
-    """
+    def __iter__(self) -> Iterator[PendingCall]:
+        with self._lock:
+            return iter(tuple(self._calls.values()))
 
-    number: int
-    call: Call
-    value: Any
-    type: ServiceType | None
-    max_size: int | None
-    deadline: float | None
-    private: bool
-    timer: Handle | None = None
-    sent: float | None = None
-    answered: bool = False
-    route: Any = None
+    def get(self, call: Call) -> PendingCall | None:
+        """Return a call; None if it has ended."""
+        return self._calls.get(call)
 
-    def encode(self, kind: ServiceType) -> bytes:
-        """Return the request's bytes for a type that may have been discovered after the call.
+    def add(self, pending: PendingCall) -> None:
+        """Add a new call, whose request does not wait yet."""
+        with self._lock:
+            self._calls[pending.call] = pending
 
-        Raises:
-            ConversionError: A value does not fit its field.
-        """
-        if self.type is not kind:
-            value = self.value
-            if self.type is not None:
-                value = self.type.request.decode(value).to_dict()
-            self.value, self.type = encode_request(kind, value, self.max_size), kind
-        return bytes(self.value)
+    def remove(self, pending: PendingCall) -> None:
+        """Remove a call that has ended."""
+        with self._lock:
+            self._calls.pop(pending.call, None)
+            pending.waiting = False
 
+    def enqueue(self, pending: PendingCall) -> None:
+        """Let a request wait to be sent, in the order of the calls, unless its call has ended."""
+        with self._lock:
+            pending.waiting = pending.call in self._calls
 
-def encode_request(kind: ServiceType, value: Any, max_size: int | None) -> bytes:
-    """Return the encoded request; raises ConversionError."""
-    data = kind.request.encode(value)
-    if max_size is not None and len(data) > max_size:
-        limit = f"at most {max_size} bytes, as its server takes no larger request"
-        raise ConversionError("", f"{len(data)} bytes", limit, kind.request.name)
-    return data
+    def first(self) -> PendingCall | None:
+        """Return the first request that waits; None if there is none."""
+        with self._lock:
+            return next((each for each in self._calls.values() if each.waiting), None)
+
+    def take(self, pending: PendingCall) -> bool:
+        """Stop a request's wait, to send or to withdraw it; return whether it was waiting."""
+        with self._lock:
+            waiting, pending.waiting = pending.waiting, False
+        return waiting
 
 
 class ServiceRequester(ABC):
@@ -144,12 +132,12 @@ class ServiceRequester(ABC):
         """
 
     @abstractmethod
-    def withdraw(self, pending: PendingCall) -> bool:
-        """Cancel the sending of a request; return False if it was already sent."""
-
-    @abstractmethod
     def forget(self, pending: PendingCall) -> None:
-        """Drop a call that has ended: do not send it, ignore its response; from any thread."""
+        """Drop a call that has ended, and ignore its response; from any thread."""
+
+    def has_left(self, pending: PendingCall) -> bool:  # noqa: ARG002 - for those that know
+        """Return whether the servers that a request was sent to are known to have left."""
+        return False
 
     @abstractmethod
     def delay(self, pending: PendingCall) -> str:
@@ -176,8 +164,8 @@ class ServiceClient(Client):
         core: The node it belongs to.
         name: Absolute service name.
         qos: The quality of service of requests and replies.
-        create_requester: Creates the requester, given the pending calls by number, a callback for
-            replies, and a callback for when a server may have appeared or left.
+        create_requester: Creates the requester, given the pending calls and a callback for when a
+            server may have appeared or left.
 
     Attributes:
         name: Absolute service name.
@@ -189,17 +177,15 @@ class ServiceClient(Client):
         core: NodeCore,
         name: str,
         qos: QoS,
-        create_requester: Callable[
-            [Mapping[int, PendingCall], OnReply, Callable[[], None]], ServiceRequester
-        ],
+        create_requester: Callable[[PendingCalls, Callable[[], None]], ServiceRequester],
     ) -> None:
         super().__init__(core, name)
         self.qos = qos
         self._numbers = itertools.count(1)
-        #: Every use of these two is atomic.
+        #: Every use is atomic.
         self._waiters: list[None] = []
-        self._pending: dict[int, PendingCall] = {}
-        self._requester = create_requester(self._pending, self._on_reply, self._on_change)
+        self._calls = PendingCalls()
+        self._requester = create_requester(self._calls, self._on_change)
         self._requester.waiters = self._waiters
         core.add(self, self._follow)
 
@@ -252,7 +238,7 @@ class ServiceClient(Client):
     @property
     def pending(self) -> int:
         """The number of calls that have not ended."""
-        return len(self._pending)
+        return len(self._calls)
 
     def call(
         self, request: Message | dict[str, Any] | None = None, /, *, timeout: float | None = 10.0
@@ -333,23 +319,24 @@ class ServiceClient(Client):
         pending = PendingCall(
             number=next(self._numbers),
             call=call,
+            on_reply=self._on_reply,
             value=taken,
             type=kind,
             max_size=max_size,
             deadline=None if timeout is None else time.monotonic() + timeout,
             private=private,
         )
-        self._pending[pending.number] = pending
+        self._calls.add(pending)
         if self._closed:  # by another thread, which may have missed this call
-            self._pending.pop(pending.number, None)
+            self._calls.remove(pending)
             self._check_open()
         call.add_done_callback(lambda _: self._on_end(pending))
         return pending
 
     def _withdraw(self, call: Call) -> bool:
         """Cancel a call whose request was not sent yet; return whether that was possible."""
-        pending = next((p for p in tuple(self._pending.values()) if p.call is call), None)
-        return pending is not None and self._requester.withdraw(pending) and call.cancel()
+        pending = self._calls.get(call)
+        return pending is not None and self._calls.take(pending) and call.cancel()
 
     # -- the end of a call -----------------------------------------------------------------------
 
@@ -357,7 +344,7 @@ class ServiceClient(Client):
         """Clean up after a call, on any thread."""
         if pending.timer is not None:
             pending.timer.close()
-        self._pending.pop(pending.number, None)
+        self._calls.remove(pending)
         self._requester.forget(pending)
 
     def _expire(self, pending: PendingCall, timeout: float) -> None:
@@ -379,10 +366,11 @@ class ServiceClient(Client):
             )
         pending.call.set_exception(error)
 
-    def _on_reply(self, number: int, data: bytes | memoryview | None, error: str | Error) -> None:
+    def _on_reply(
+        self, pending: PendingCall, data: bytes | memoryview | None, error: str | Error
+    ) -> None:
         """End a call with its response or its error; called on a receiving thread."""
-        pending = self._pending.get(number)
-        if pending is None:
+        if pending.call.done():
             return
         pending.answered = True
         try:
@@ -390,7 +378,7 @@ class ServiceClient(Client):
                 self._complete(pending, data)
             elif isinstance(error, Error):
                 pending.call.set_exception(error)
-            elif error in (SERVER_LEFT, CALL_DROPPED):
+            elif error in (SERVER_LEFT, CALL_DROPPED) or self._requester.has_left(pending):
                 pending.call.set_exception(self._loss_error(pending))
             else:
                 reason = error or "there is no response"
@@ -431,7 +419,7 @@ class ServiceClient(Client):
         self._closed = True
         if self._core.forked:
             return
-        for each in list(self._pending.values()):
+        for each in self._calls:
             each.call.set_exception(
                 NodeClosedError(f"the client of {self.name} was closed during a call")
             )

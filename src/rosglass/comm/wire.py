@@ -1,4 +1,4 @@
-"""The seam below the client layer: writers, readers, requesters, repliers, and the graph.
+"""The seam below the client layer: writers, readers, requesters, repliers, calls, and the graph.
 
 A wire moves bytes and reports endpoints. What ROS means by them (names, types, QoS, callbacks,
 deadlines) is defined once, in :mod:`rosglass.comm`. TCPROS implements the four
@@ -7,11 +7,14 @@ endpoints; DDS, Zenoh and ``local://`` also the :class:`Middleware` of ROS 2 nod
 
 from __future__ import annotations
 
+import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rosglass.comm.handle import Handle
+from rosglass.comm.promise import Promise
+from rosglass.errors import ConversionError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -19,21 +22,24 @@ if TYPE_CHECKING:
     from rosglass.comm.graph import EndpointInfo, Graph, NodeName, Status
     from rosglass.errors import Error
     from rosglass.interfaces import Definition
+    from rosglass.messages import Message, ServiceType  # noqa: F401 - the base of Call
 
     Buffer = bytes | bytearray | memoryview
 
 __all__ = [
     "CALL_DROPPED",
     "SERVER_LEFT",
+    "Call",
     "Middleware",
-    "OnReply",
     "OnRequest",
     "OnSample",
+    "PendingCall",
     "Reader",
     "Replier",
     "RequestId",
     "Requester",
     "Writer",
+    "encode_request",
 ]
 
 
@@ -154,18 +160,97 @@ class Reader(Handle):
 SERVER_LEFT, CALL_DROPPED = "its server went away", "its server ended the call without a reply"
 
 
-class OnReply(Protocol):
-    """Receives replies; called on the wire's thread, must return at once."""
+class Call(Promise["Message"]):
+    """The promise of a service's response.
 
-    def __call__(self, number: int, data: bytes | memoryview | None, error: str | Error) -> None:
-        """Receive a reply.
+    ``result(timeout)`` waits for it, ``await call`` does so in asyncio, :meth:`on_done` calls back.
+    ``cancel()`` cancels the call: a request that waits for a server is not sent, and the response
+    to a sent one is ignored (the server is not notified: ROS has no message for that).
+    """
+
+
+@dataclass(eq=False, kw_only=True)
+class PendingCall:
+    """A call that has not ended; its client owns it, and enforces its deadline.
+
+    The layers below receive it by reference, and keep their state of the call here.
+
+    Attributes:
+        number: Identifies it among the client's calls; ascending.
+        call: The caller's promise.
+        on_reply: Called with the call, its response, and the reason if there is none.
+        value: The encoded request, or the value to encode while the type is unknown.
+        type: The type it is encoded for; None while that is unknown.
+        max_size: Largest size of a request in bytes; None for no limit.
+        deadline: Monotonic time at which it ends without response; None for no limit.
+        private: Whether the caller waits in :meth:`ServiceClient.call`: its end runs no callback.
+        made: Monotonic time of the call.
+        timer: Ends it at its deadline; None in :meth:`ServiceClient.call`, which does so itself.
+        waiting: Whether its request waits to be sent; see :class:`PendingCalls`.
+        sent: Monotonic time at which its request was sent, None before.
+        answered: Whether a reply, or the reason for a missing one, was received.
+        requester: The requester of the wire that sent it; None before.
+        servers: Identities of the servers in the graph at that time.
+        lost_at: Monotonic time when the last of them left; None while one may answer.
+        route: Private data of the wire; None when it has none.
+    """
+
+    number: int
+    call: Call
+    on_reply: Callable[[PendingCall, bytes | memoryview | None, str | Error], None]
+    value: Any
+    type: ServiceType | None
+    max_size: int | None
+    deadline: float | None
+    private: bool
+    made: float = field(default_factory=time.monotonic)
+    timer: Handle | None = None
+    waiting: bool = False
+    sent: float | None = None
+    answered: bool = False
+    requester: Requester | None = None
+    servers: frozenset[bytes | str] = frozenset()
+    lost_at: float | None = None
+    route: Any = None
+
+    def left(self) -> float | None:
+        """Return the seconds until the deadline, above 0; None for no limit."""
+        return None if self.deadline is None else max(0.001, self.deadline - time.monotonic())
+
+    def answer(self, data: bytes | memoryview) -> None:
+        """End the call with its response, with its encapsulation header; on any thread."""
+        self.on_reply(self, data, "")
+
+    def fail(self, reason: str | Error) -> None:
+        """End the call without response; on any thread.
 
         Args:
-            number: The request's number, as given to :meth:`Requester.send`.
-            data: The response with its encapsulation header; None if there is none.
-            error: Why there is none, e.g. :data:`SERVER_LEFT` or :data:`CALL_DROPPED`, or the error
-                with which the call ends.
+            reason: :data:`SERVER_LEFT`, :data:`CALL_DROPPED`, why the server refused it, or the
+                error with which the call ends.
         """
+        self.on_reply(self, None, reason)
+
+    def encode(self, kind: ServiceType) -> bytes:
+        """Return the request's bytes for a type that may have been discovered after the call.
+
+        Raises:
+            ConversionError: A value does not fit its field.
+        """
+        if self.type is not kind:
+            value = self.value
+            if self.type is not None:
+                value = self.type.request.decode(value).to_dict()
+            self.value, self.type = encode_request(kind, value, self.max_size), kind
+        return bytes(self.value)
+
+
+def encode_request(kind: ServiceType, value: Any, max_size: int | None) -> bytes:
+    """Return the encoded request; raises ConversionError."""
+    data = kind.request.encode(value)
+    if max_size is not None and len(data) > max_size:
+        limit = f"at most {max_size} bytes, as its server takes no larger request"
+        raise ConversionError("", f"{len(data)} bytes", limit, kind.request.name)
+    return data
 
 
 class Requester(Handle):
@@ -176,27 +261,25 @@ class Requester(Handle):
     #: Called from any thread when the result of :meth:`ready` may have changed; set by the client.
     #: Without such calls, a server is discovered up to a second late.
     changed: Callable[[], None] | None = None
-    #: Returns whether the reply to a request, given by its number, only runs fast code of ours, so
-    #: that it may run in the middle of receiving. Set by the client.
-    quick: Callable[[int], bool] | None = None
 
     @abstractmethod
     def ready(self) -> bool:
         """Return whether a server is connected, so that a request sent now is not lost."""
 
     @abstractmethod
-    def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
+    def send(self, pending: PendingCall, data: bytes | bytearray) -> None:
         """Send a request.
 
+        The wire ends the call with the reply, which may arrive before this returns. That of a
+        private call may be handled in the middle of receiving, as it only runs fast code of ours.
+
         Args:
-            number: Identifies the reply; higher than those of earlier requests. The reply may be
-                received before this returns.
+            pending: The call; its number is higher than those of earlier requests. The client ends
+                it at its deadline; the middleware may drop the request then.
             data: The payload with its encapsulation header.
-            timeout: Seconds after which the reply is useless; None for never. The client ends the
-                call; the middleware may drop the request then.
         """
 
-    def is_reply_lost(self, number: int) -> bool:
+    def is_reply_lost(self, pending: PendingCall) -> bool:
         """Return whether every server that was sent a request has left since, even if it is back.
 
         For middlewares that lose replies sent in between, without knowing.
@@ -204,7 +287,7 @@ class Requester(Handle):
         return False
 
     @abstractmethod
-    def forget(self, number: int) -> None:
+    def forget(self, pending: PendingCall) -> None:
         """Drop the reply to a request if it still arrives."""
 
 
@@ -335,8 +418,8 @@ class Middleware(ABC):
         """
 
     @abstractmethod
-    def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> Requester:
-        """Announce a service client, which delivers replies to `on_reply`."""
+    def create_requester(self, endpoint: EndpointInfo) -> Requester:
+        """Announce a service client, which ends the calls that it sends."""
 
     @abstractmethod
     def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> Replier:

@@ -15,11 +15,11 @@ from rosglass.wires.tcpros.registrations import Member
 from rosglass.wires.tcpros.service_requester import TcprosRequester, locate, probe
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Mapping
+    from collections.abc import Awaitable, Callable
 
     from rosglass.comm import Answer, EndpointInfo, Executor
-    from rosglass.comm.service_client import PendingCall
-    from rosglass.comm.wire import OnReply, OnRequest
+    from rosglass.comm.service_client import PendingCalls
+    from rosglass.comm.wire import OnRequest
     from rosglass.messages import Message, ServiceType
     from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.node import TcprosNode
@@ -48,12 +48,9 @@ class Services:
     ) -> ServiceClient:
         """Return a new client of a service."""
 
-        # The client owns the pending calls; a connection knows the one it is for.
-        def create(
-            _pending: Mapping[int, PendingCall], on_reply: OnReply, on_change: Callable[[], None]
-        ) -> TcprosRequester:
+        def create(calls: PendingCalls, on_change: Callable[[], None]) -> TcprosRequester:
             return TcprosRequester(
-                self._core, self.types.record, name, type, persistent, on_reply, on_change
+                self._core, self.types.record, name, type, persistent, calls, on_change
             )
 
         return ServiceClient(self._core, name, _profile(qos, name), create)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -20,7 +19,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm import EndpointInfo, EndpointKind, QoS
 from rosglass.comm.core import NodeMember
 from rosglass.comm.names import similar
-from rosglass.comm.service_client import Call, PendingCall, ServiceClient, ServiceRequester
+from rosglass.comm.service_client import ServiceClient, ServiceRequester
 from rosglass.comm.service_server import ServiceServer
 from rosglass.comm.wire import SERVER_LEFT, Replier, RequestId
 from rosglass.errors import Error, NodeClosedError, ServiceError
@@ -35,11 +34,12 @@ from rosglass.ros2.announced import (
 from rosglass.ros2.core import REQUEST_LIMIT, RequestWindow
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Mapping, Sequence
+    from collections.abc import Awaitable, Callable, Sequence
 
-    from rosglass.comm import Answer, Executor
+    from rosglass.comm import Answer, Call, Executor
+    from rosglass.comm.service_client import PendingCalls
     from rosglass.comm.timers import Timers
-    from rosglass.comm.wire import OnReply, OnRequest, Requester
+    from rosglass.comm.wire import OnRequest, PendingCall, Requester
     from rosglass.messages import Message, ServiceType
     from rosglass.ros2.core import Core
 
@@ -120,21 +120,6 @@ class ActionServiceClient(ServiceClient):
         return self._withdraw(call)
 
 
-@dataclass(eq=False, slots=True)
-class _Route:
-    """The route that a request was sent on.
-
-    Attributes:
-        requester: The requester that sent it.
-        servers: Identities of the servers in the graph at that time.
-        lost_at: Monotonic time when the last of them left; None while one may answer.
-    """
-
-    requester: Requester
-    servers: frozenset[bytes | str]
-    lost_at: float | None = None
-
-
 class Ros2Requester(ServiceRequester):
     """The requester of a service client, for the version of the type that servers announce.
 
@@ -145,8 +130,7 @@ class Ros2Requester(ServiceRequester):
         name: Absolute service name.
         wanted: The type, its name, or None; see :func:`create_service_client`.
         qos: Profile of requests and replies.
-        pending: The calls that have not ended, by number.
-        on_reply: Called with the outcome of each request.
+        calls: The calls that have not ended.
         on_change: Called when a server may have appeared or left.
         waits_for_reconnect: See :class:`ActionServiceClient`.
         quiet: Whether the client's owner logs conflicts.
@@ -158,8 +142,7 @@ class Ros2Requester(ServiceRequester):
         name: str,
         wanted: ServiceType | str | None,
         qos: QoS,
-        pending: Mapping[int, PendingCall],
-        on_reply: OnReply,
+        calls: PendingCalls,
         on_change: Callable[[], None],
         *,
         waits_for_reconnect: bool = False,
@@ -167,16 +150,14 @@ class Ros2Requester(ServiceRequester):
     ) -> None:
         self._core, self._name, self._qos, self._quiet = core, name, qos, quiet
         self._waits_for_reconnect = waits_for_reconnect
-        self._pending, self._on_reply, self._on_change = pending, on_reply, on_change
+        self._calls, self._on_change = calls, on_change
         self._discovers = wanted is None
         given = None if wanted is None else core.types.service(wanted)
         fixed = wanted is not None and not isinstance(wanted, str)
         self._announced: Announced[ServiceType] = Announced(core, core.types.service, given, fixed)
         self.type = given
-        #: Guards the queue, the current requester and the flags of :meth:`_flush`.
+        #: Guards the current requester and the flags of :meth:`_flush`.
         self._lock = threading.Lock()
-        #: Requests that wait to be sent.
-        self._queue: deque[PendingCall] = deque()
         #: None while the type is unknown, and after closing.
         self._requester: Requester | None = None
         stall_s = HOLD_S if waits_for_reconnect else STALL_S
@@ -270,26 +251,13 @@ class Ros2Requester(ServiceRequester):
 
     def send(self, pending: PendingCall) -> None:
         """Send a request as soon as a server is available, in the order of the calls."""
-        with self._lock:
-            self._queue.append(pending)
-        if pending.call.done():
-            self.forget(pending)  # it ended before it was queued
+        self._calls.enqueue(pending)
         self._flush()
 
-    def withdraw(self, pending: PendingCall) -> bool:
-        """Withdraw a request; return False if it was already sent."""
-        with self._lock:
-            if pending not in self._queue:
-                return False
-            self._queue.remove(pending)
-        return True
-
     def forget(self, pending: PendingCall) -> None:
-        """Drop an ended call: do not send its request, ignore its response."""
-        if pending.sent is None:
-            self.withdraw(pending)
-        if pending.route is not None and not pending.answered:
-            pending.route.requester.forget(pending.number)
+        """Ignore the response of an ended call, and make room for another request."""
+        if pending.requester is not None and not pending.answered:
+            pending.requester.forget(pending)
         for send in self._window.leave(pending):
             if pending.private:  # this may run while the middleware receives
                 self._core.timers.after(0.0, send)
@@ -313,25 +281,22 @@ class Ros2Requester(ServiceRequester):
         except BaseException:
             self._flushing = False
             raise
-        if self._queue and not self._retrying and self._fitting(self._servers()):
+        waits = self._calls.first() is not None and not self._retrying
+        if waits and self._fitting(self._servers()):
             # The server is not linked yet, or holds requests: no event reports the change.
             self._retrying = True
             self._core.timers.after(_RETRY_S, self._retry)
 
     def _send_waiting(self) -> None:
-        while self._queue and self.ready():
+        while (pending := self._calls.first()) is not None and self.ready():
             with self._lock:
                 requester, kind = self._requester, self.type
-                if requester is None or kind is None or not self._queue:
-                    return
-                pending = self._queue[0]
-                if not self._window.enter(pending, self._flush):
-                    return
-                self._queue.popleft()
-            if pending.call.done():
-                self.forget(pending)
-            else:
+            if requester is None or kind is None or not self._window.enter(pending, self._flush):
+                return
+            if self._calls.take(pending) and not pending.call.done():
                 self._send(requester, kind, pending)
+            else:
+                self.forget(pending)  # it has just been withdrawn
 
     def _retry(self) -> None:
         self._retrying = False
@@ -341,11 +306,9 @@ class Ros2Requester(ServiceRequester):
         error: Error
         try:
             data = pending.encode(kind)
-            now, deadline = time.monotonic(), pending.deadline
-            left = None if deadline is None else max(0.001, deadline - now)
-            pending.route = _Route(requester, self.server_ids())
-            pending.sent = now
-            requester.send(pending.number, data, left)
+            pending.requester, pending.servers = requester, self.server_ids()
+            pending.sent = time.monotonic()
+            requester.send(pending, data)
         except Error as problem:
             error = problem
         except Exception as problem:  # noqa: BLE001 - the caller waits for it
@@ -353,25 +316,9 @@ class Ros2Requester(ServiceRequester):
             error = ServiceError(f"{self._name}: the request could not be sent: {problem}")
         else:
             if pending.call.done() and not pending.answered:
-                requester.forget(pending.number)  # cancelled while it was sent
+                requester.forget(pending)  # cancelled while it was sent
             return
         pending.call.set_exception(error)
-
-    def _on_middleware_reply(
-        self, number: int, data: bytes | memoryview | None, error: str | Error
-    ) -> None:
-        """Pass a reply on, or the reason why there is none."""
-        if data is None:
-            pending = self._pending.get(number)
-            route = None if pending is None else pending.route
-            if route is not None and route.servers and not route.servers & self.server_ids():
-                error = SERVER_LEFT  # clearer than the middleware's reason
-        self._on_reply(number, data, error)
-
-    def _is_quick(self, number: int) -> bool:
-        """Return whether a reply may be taken on a receiving thread, as it runs no user code."""
-        pending = self._pending.get(number)
-        return pending is not None and pending.private
 
     # -- following the graph -----------------------------------------------------------------------
 
@@ -384,8 +331,7 @@ class Ros2Requester(ServiceRequester):
             except Error as error:
                 self._failure = str(error)
         self._on_change()
-        if self._queue:
-            self._flush()
+        self._flush()
         self._end_lost_calls()
 
     def _adopt(self, *, retry: bool) -> bool:
@@ -404,10 +350,9 @@ class Ros2Requester(ServiceRequester):
         requester = core.middleware.create_requester(
             EndpointInfo(
                 EndpointKind.SERVICE_CLIENT, self._name, kind.name, core.name, self._qos, known
-            ),
-            self._on_middleware_reply,
+            )
         )
-        requester.changed, requester.quick = core.wake, self._is_quick
+        requester.changed = core.wake
         with self._lock:
             old, self._requester = self._requester, requester
             self.type = kind
@@ -419,46 +364,46 @@ class Ros2Requester(ServiceRequester):
         if closed:
             requester.close()
         if old is not None:
-            for pending in tuple(self._pending.values()):
-                if pending.route is not None and pending.route.requester is old:
-                    self._on_reply(pending.number, None, SERVER_LEFT)
+            for pending in self._calls:
+                if pending.requester is old:
+                    pending.fail(SERVER_LEFT)
 
     def _end_lost_calls(self) -> None:
         """End the calls whose servers have been missing for :data:`_GRACE_S`."""
-        if not self._pending:
-            return
-        here = self.server_ids()
         now = time.monotonic()
-        for pending in tuple(self._pending.values()):
-            route = pending.route
-            if route is None:
+        for pending in self._calls:
+            requester = pending.requester
+            if requester is None:
                 continue
-            if not route.servers:
-                route.servers = here
-            if not self._has_left(pending, here):
-                route.lost_at = None
-            elif route.lost_at is None:
-                route.lost_at = now
-            elif now - route.lost_at >= _GRACE_S:
-                self._on_reply(pending.number, None, SERVER_LEFT)
-                route.requester.forget(pending.number)
+            if not pending.servers:
+                pending.servers = self.server_ids()
+            if not self._is_lost(pending, requester):
+                pending.lost_at = None
+            elif pending.lost_at is None:
+                pending.lost_at = now
+            elif now - pending.lost_at >= _GRACE_S:
+                pending.fail(SERVER_LEFT)
+                requester.forget(pending)
 
-    def _has_left(self, pending: PendingCall, here: frozenset[bytes | str]) -> bool:
-        """Return whether the servers that a request was sent to have left."""
-        route = pending.route
-        lost = route.requester.is_reply_lost(pending.number) or self._is_replaced(route)
+    def has_left(self, pending: PendingCall) -> bool:
+        """Return whether the servers that a request was sent to have left the graph."""
+        return bool(pending.servers) and not pending.servers & self.server_ids()
+
+    def _is_lost(self, pending: PendingCall, requester: Requester) -> bool:
+        """Return whether a call has no server any more that may answer it."""
+        lost = requester.is_reply_lost(pending) or self._is_replaced(pending)
         if self._waits_for_reconnect:
             return bool(lost and self.ready())  # it can be sent again
-        return lost or (bool(route.servers) and not route.servers & here)
+        return lost or self.has_left(pending)
 
-    def _is_replaced(self, route: _Route) -> bool:
+    def _is_replaced(self, pending: PendingCall) -> bool:
         """Return whether each of a request's servers has a successor of the same node name.
 
         A killed server stays in the graph of DDS for 10 to 20 s, although its successor answers.
         """
         servers = self._fitting(self._servers())
-        successors = {each.node for each in servers if endpoint_id(each) not in route.servers}
-        asked = [each.node for each in servers if endpoint_id(each) in route.servers]
+        successors = {each.node for each in servers if endpoint_id(each) not in pending.servers}
+        asked = [each.node for each in servers if endpoint_id(each) in pending.servers]
         return bool(asked) and all(node.name and node in successors for node in asked)
 
     def close(self) -> None:
@@ -466,7 +411,6 @@ class Ros2Requester(ServiceRequester):
         with self._lock:
             self._closed = True
             requester, self._requester = self._requester, None
-            self._queue.clear()
         if requester is not None:
             requester.close()
 

@@ -22,9 +22,9 @@ from rosglass.comm import ConnectionState, Durability, EndpointKind, Handle, His
 from rosglass.comm.wire import (
     SERVER_LEFT,
     Middleware,
-    OnReply,
     OnRequest,
     OnSample,
+    PendingCall,
     Reader,
     Replier,
     Requester,
@@ -324,47 +324,46 @@ class LocalReader(_Endpoint[LocalWriter], Reader):
 class LocalRequester(_Endpoint["LocalReplier"], Requester):
     """Sends the requests of a service client to all its servers."""
 
-    def __init__(self, owner: LocalMiddleware, info: EndpointInfo, on_reply: OnReply) -> None:
+    def __init__(self, owner: LocalMiddleware, info: EndpointInfo) -> None:
         super().__init__(owner, info)
-        self._on_reply = on_reply
-        #: The servers that may still answer, by the request's number.
-        self._pending: dict[int, set[LocalReplier]] = {}
+        #: The sent calls, by number; their `route` has the servers that may still answer.
+        self._calls: dict[int, PendingCall] = {}
         self._open()
 
     def ready(self) -> bool:
         """Return whether a server exists."""
         return bool(self._network.counterparts(self.info))
 
-    def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:  # noqa: ARG002 - the caller keeps it
+    def send(self, pending: PendingCall, data: bytes | bytearray) -> None:
         """Send a request to all servers; the first reply counts."""
         with self._lock:
             self._check_open()
             servers = self._network.counterparts(self.info)
-            self._pending[number] = set(servers)
-        request = RequestId(self.info.gid, number, self)
+            self._calls[pending.number], pending.route = pending, set(servers)
+        request = RequestId(self.info.gid, pending.number, self)
         for server in servers:
             server.handle_request(request, bytes(data))
         if not servers:
-            self._fail(number, SERVER_LEFT)
+            self._fail(pending.number, SERVER_LEFT)
 
-    def forget(self, number: int) -> None:
+    def forget(self, pending: PendingCall) -> None:
         """Drop the reply to a request."""
-        with self._lock:
-            self._pending.pop(number, None)
+        self._take(pending.number)
 
     def handle_reply(self, number: int, data: bytes) -> None:
         """Deliver the first reply to a request."""
-        if self._complete(number):
-            self._on_reply(number, data, "")
+        pending = self._take(number)
+        if pending is not None and not self.closed:
+            pending.answer(data)
 
     def handle_refusal(self, number: int, server: LocalReplier, reason: str) -> None:
         """Fail a request once its last server has refused it."""
         with self._lock:
-            servers = self._pending.get(number)
-            if servers is None:
+            pending = self._calls.get(number)
+            if pending is None:
                 return
-            servers.discard(server)
-        if not servers:
+            pending.route.discard(server)
+        if not pending.route:
             self._fail(number, reason)
 
     def link(self, other: LocalReplier, calls: list[_Call]) -> None:  # noqa: ARG002 - any will do
@@ -376,20 +375,21 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
         """Fail the requests that only this server could answer."""
         calls += [
             partial(self.handle_refusal, number, other, SERVER_LEFT)
-            for number, servers in self._pending.items()
-            if other in servers
+            for number, pending in self._calls.items()
+            if other in pending.route
         ]
         if self.changed is not None:
             calls.append(self.changed)
 
     def _fail(self, number: int, reason: str) -> None:
-        if self._complete(number):
-            self._on_reply(number, None, reason)
+        pending = self._take(number)
+        if pending is not None and not self.closed:
+            pending.fail(reason)
 
-    def _complete(self, number: int) -> bool:
-        """Remove a request; return whether its client still waits for the reply."""
+    def _take(self, number: int) -> PendingCall | None:
+        """Remove a sent call; return None if it has ended."""
         with self._lock:
-            return self._pending.pop(number, None) is not None and not self.closed
+            return self._calls.pop(number, None)
 
 
 class LocalReplier(_Endpoint[LocalRequester], Replier):
@@ -491,9 +491,9 @@ class LocalMiddleware(Middleware):
         """Announce a subscription and deliver its samples to `on_sample`."""
         return LocalReader(self, endpoint, on_sample)
 
-    def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> LocalRequester:
+    def create_requester(self, endpoint: EndpointInfo) -> LocalRequester:
         """Announce a service client and return its requester."""
-        return LocalRequester(self, endpoint, on_reply)
+        return LocalRequester(self, endpoint)
 
     def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> LocalReplier:
         """Announce a service server and deliver its requests to `on_request`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import weakref
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import ConnectionState, EndpointInfo, EndpointKind, NodeName, QoS, Status
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Handle
     from rosglass.comm.graph import Graph
-    from rosglass.comm.wire import OnReply, OnRequest, OnSample, RequestId
+    from rosglass.comm.wire import OnRequest, OnSample, PendingCall, RequestId
 
 SERVER, CLIENT = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
 
@@ -73,43 +74,51 @@ class SteeredReader(LocalReader):
 class SteeredRequester(LocalRequester):
     """`sent` has what was sent; `reply` answers by hand, the first that was sent as number 1."""
 
-    def __init__(self, owner: LocalMiddleware, info: EndpointInfo, on_reply: OnReply) -> None:
-        self.on_reply = on_reply
+    def __init__(self, owner: LocalMiddleware, info: EndpointInfo) -> None:
         #: Whether a server is linked; None for as the graph says.
         self.linked: bool | None = None
         self.sent: list[bytes] = []
         self.timeouts: list[float | None] = []
         self.forgotten: list[int] = []
-        self._numbers: list[int] = []
+        #: Weak references, as the client owns its calls.
+        self._sent_calls: list[weakref.ref[PendingCall]] = []
         #: Requests whose server left, even if another one serves now.
         self.abandoned: set[int] = set()
-        super().__init__(owner, info, on_reply)
+        super().__init__(owner, info)
 
     def ready(self) -> bool:
         return super().ready() if self.linked is None else self.linked
 
-    def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
-        self._numbers.append(number)
-        super().send(number, data, timeout)
+    def send(self, pending: PendingCall, data: bytes | bytearray) -> None:
+        self._sent_calls.append(weakref.ref(pending))
+        super().send(pending, data)
         self.sent.append(bytes(data))
-        self.timeouts.append(timeout)
+        self.timeouts.append(pending.left())
 
     def _fail(self, number: int, reason: str) -> None:
         if self.linked is None:  # else the test answers
             super()._fail(number, reason)
 
-    def is_reply_lost(self, number: int) -> bool:
-        return self._numbers.index(number) + 1 in self.abandoned
+    def is_reply_lost(self, pending: PendingCall) -> bool:
+        return self._count_of(pending) in self.abandoned
 
-    def forget(self, number: int) -> None:
-        self.forgotten.append(self._numbers.index(number) + 1)
-        super().forget(number)
+    def forget(self, pending: PendingCall) -> None:
+        self.forgotten.append(self._count_of(pending))
+        super().forget(pending)
+
+    def _count_of(self, pending: PendingCall) -> int:
+        return next(n for n, sent in enumerate(self._sent_calls, 1) if sent() is pending)
 
     def reply(self, count: int, data: bytes | None, error: str = "") -> None:
         """Hand over a reply to a request that was sent, as if it had been received."""
-        known = count <= len(self._numbers)
-        if not self.closed:
-            self.on_reply(self._numbers[count - 1] if known else -count, data, error)
+        pending = self._sent_calls[count - 1]() if count <= len(self._sent_calls) else None
+        if self.closed or pending is None:
+            return
+        self._take(pending.number)
+        if data is None:
+            pending.fail(error)
+        else:
+            pending.answer(data)
 
 
 class SteeredReplier(LocalReplier):
@@ -170,8 +179,8 @@ class SteeredMiddleware(LocalMiddleware):
         self.readers.append(SteeredReader(self, endpoint, on_sample))
         return self.readers[-1]
 
-    def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> SteeredRequester:
-        self.requesters.append(SteeredRequester(self, endpoint, on_reply))
+    def create_requester(self, endpoint: EndpointInfo) -> SteeredRequester:
+        self.requesters.append(SteeredRequester(self, endpoint))
         return self.requesters[-1]
 
     def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> SteeredReplier:

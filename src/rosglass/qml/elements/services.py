@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.node import Node
-    from rosglass.comm.service_client import Call
     from rosglass.comm.service_client import ServiceClient as Caller_
     from rosglass.comm.service_server import ServiceServer as Server
+    from rosglass.comm.wire import Call
     from rosglass.messages import Message
     from rosglass.qml.engine.runtime import Runtime
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo, NodeName
     from rosglass.comm.graph import Graph
-    from rosglass.comm.wire import OnReply, OnRequest, OnSample
+    from rosglass.comm.wire import OnRequest, OnSample
     from rosglass.interfaces import Definition
 
 __all__ = ["DdsDiscovery", "DdsMiddleware"]
@@ -271,9 +271,9 @@ class DdsMiddleware(Middleware):
         self._show(endpoint, reader.gid)
         return reader
 
-    def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> Requester:
+    def create_requester(self, endpoint: EndpointInfo) -> Requester:
         """Create the DDS writer and reader of a service client."""
-        requester = DdsRequester(self._joined(), self._graph, endpoint, on_reply)
+        requester = DdsRequester(self._joined(), self._graph, endpoint)
         self._show(endpoint, requester.gid)
         return requester
 

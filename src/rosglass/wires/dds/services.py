@@ -38,7 +38,7 @@ from rosglass.wires.dds.service_endpoints import (
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
     from rosglass.comm.graph import Graph
-    from rosglass.comm.wire import OnReply, OnRequest
+    from rosglass.comm.wire import OnRequest, PendingCall
     from rosglass.wires.dds.cyclone import Discovered
     from rosglass.wires.dds.endpoints import Taken
     from rosglass.wires.dds.participant import Participant
@@ -98,6 +98,19 @@ _log = logging.getLogger("rosglass.ros2")
 _ANSWERLESS_S = 2.0
 
 
+@dataclass(slots=True)
+class _Route:
+    """How a request was sent; its call refers to it until the reply is of no use.
+
+    Attributes:
+        key: The scheme and the number that identify its reply; None before it was sent.
+        readers: Handles of the servers' readers that have been linked ever since it was sent.
+    """
+
+    key: tuple[Scheme, int] | None = None
+    readers: frozenset[int] = frozenset()
+
+
 class DdsRequester(Requester):
     """The DDS writer and reader of a service client; arguments as for :class:`ServiceEndpoints`.
 
@@ -105,26 +118,17 @@ class DdsRequester(Requester):
         gid: Identity of its request writer, which identifies the client.
     """
 
-    def __init__(
-        self,
-        participant: Participant,
-        graph: Graph,
-        endpoint: EndpointInfo,
-        on_reply: OnReply,
-    ) -> None:
-        self._service, self._on_reply = endpoint.name, on_reply
+    def __init__(self, participant: Participant, graph: Graph, endpoint: EndpointInfo) -> None:
+        self._service = endpoint.name
         #: Guards the calls, and sending: replies are received on other threads.
         self._lock = threading.Lock()
         #: A random number in place of rmw_cyclonedds's instance handle; unique in the domain.
         self._id = secrets.randbits(64)
-        #: Sequence numbers of the sent requests by number of the call, 0 if not sent yet.
-        self._calls: dict[int, int] = {}
-        self._by_sequence: dict[int, int] = {}
+        #: The sent calls, by what identifies their replies; the `route` of each is a `_Route`.
+        self._calls: dict[tuple[Scheme, int], PendingCall] = {}
         self._sequence = 0
         #: Handles of the linked servers' request readers; they change with a reconnection.
         self._linked: dict[Scheme, frozenset[int]] = {}
-        #: For each sent call, the readers that have been linked ever since.
-        self._sent_to: dict[int, frozenset[int]] = {}
         #: How requests are sent now; None if no server is linked.
         self._scheme: Scheme | None = None
         #: When request readers without a known server appeared, and when to check them again.
@@ -161,33 +165,33 @@ class DdsRequester(Requester):
             self._endpoints.refresh()
         return self._scheme is not None and not self._endpoints.closed
 
-    def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
+    def send(self, pending: PendingCall, data: bytes | bytearray) -> None:
         """Send a request; see :meth:`rosglass.comm.wire.Requester.send`."""
         if self._endpoints.closed:
             raise NodeClosedError(f"the client of {self._service} is closed")
-        with self._lock:
-            self._calls[number] = 0
+        pending.route = _Route()
 
         def expired() -> None:
-            self._fail(number, "its server takes no requests")
+            self._fail(pending, "its server takes no requests")
 
+        timeout = pending.left()
         self._endpoints.outbox.put(
-            lambda: self._send(number, data),
+            lambda: self._send(pending, data),
             float("inf") if timeout is None else timeout,
             expired,
             # An exception from a signal in the main thread must not spoil the sequence count.
             now=self._scheme is not Scheme.IDENTITY or not in_main_thread(),
         )
 
-    def is_reply_lost(self, number: int) -> bool:
+    def is_reply_lost(self, pending: PendingCall) -> bool:
         """Return whether a request's servers have left, so that their replies are lost."""
-        readers = self._sent_to.get(number)
-        return readers is not None and not readers
+        route: _Route | None = pending.route
+        return route is not None and route.key is not None and not route.readers
 
-    def forget(self, number: int) -> None:
+    def forget(self, pending: PendingCall) -> None:
         """Drop the reply to a request, if it still arrives."""
         with self._lock:
-            self._drop(number)
+            self._drop(pending)
 
     def close(self) -> None:
         """Withdraw the client; replies that still arrive are dropped."""
@@ -196,11 +200,10 @@ class DdsRequester(Requester):
         self._endpoints.origins.set_receiver(None)
         self._endpoints.close()
         with self._lock:
-            self._calls.clear()
-            self._by_sequence.clear()
-            self._sent_to.clear()
+            for pending in list(self._calls.values()):
+                self._drop(pending)
 
-    def _send(self, number: int, data: bytes | bytearray) -> bool:
+    def _send(self, pending: PendingCall, data: bytes | bytearray) -> bool:
         """Send a request; return False if it must be tried again."""
         # A server that has just appeared must not get a request that it would misread.
         self._endpoints.refresh_readers()
@@ -208,16 +211,17 @@ class DdsRequester(Requester):
             self._endpoints.refresh()
         scheme = self._scheme
         if scheme is None:
-            if self._schemes().get(Scheme.IDENTITY) is False and number in self._calls:
+            if self._schemes().get(Scheme.IDENTITY) is False and pending.route is not None:
                 return False  # a server is about to be ready
-            self._fail(number, SERVER_LEFT)
+            self._fail(pending, SERVER_LEFT)
             return True
         parts: Parts = (data,)
         if scheme is Scheme.HEADER:
-            parts = with_header(data, pack_header(self._id, number))
+            parts = with_header(data, pack_header(self._id, pending.number))
         # Replies are looked up under the same lock: they may arrive before this returns.
         with self._lock:
-            if number not in self._calls:
+            route: _Route | None = pending.route
+            if route is None or self._endpoints.closed:
                 return True
             if scheme is Scheme.IDENTITY and self._sequence < 0:
                 raise ServiceError(
@@ -233,21 +237,19 @@ class DdsRequester(Requester):
                     return False
                 raise
             self._sequence = sequence + 1 if sequence >= 0 else -1
-            self._sent_to[number] = self._linked.get(scheme, frozenset())
-            if scheme is Scheme.IDENTITY:
-                self._calls[number] = self._sequence
-                self._by_sequence[self._sequence] = number
+            number = pending.number if scheme is Scheme.HEADER else self._sequence
+            route.key, route.readers = (scheme, number), self._linked.get(scheme, frozenset())
+            self._calls[route.key] = pending
         return True
 
     def _on_received(self, origin: Origin, data: bytes | memoryview) -> bool:
         """Take a reply on the receiving thread; return False to get it from the pump instead."""
-        quick = self.quick
         # A thread that holds the lock may be sending, and must not block the receiving thread.
-        if quick is None or not self._lock.acquire(blocking=False):
+        if not self._lock.acquire(blocking=False):
             return False
         try:
             claim = self._match(origin.related, data)
-            if claim is None or not quick(claim[0]):
+            if claim is None or not claim[0].private:
                 return False
             self._drop(claim[0])
         finally:
@@ -286,31 +288,32 @@ class DdsRequester(Requester):
 
     def _match(
         self, related: Identity | None, data: bytes | memoryview
-    ) -> tuple[int, Scheme] | None:
+    ) -> tuple[PendingCall, Scheme] | None:
         """Return the open call that a reply answers, and the scheme that identifies it."""
-        number, scheme = None, Scheme.IDENTITY
+        found, scheme = None, Scheme.IDENTITY
         if related is not None and related.guid in (self.gid, self._endpoints.reader.guid):
-            number = self._by_sequence.get(related.sequence)
-        if number is None and (header := unpack_header(data)) is not None and header[0] == self._id:
-            number, scheme = header[1], Scheme.HEADER
-        return None if number is None or number not in self._calls else (number, scheme)
+            found = self._calls.get((scheme, related.sequence))
+        if found is None and (header := unpack_header(data)) is not None and header[0] == self._id:
+            scheme = Scheme.HEADER
+            found = self._calls.get((scheme, header[1]))
+        return None if found is None else (found, scheme)
 
-    def _drop(self, number: int) -> bool:
-        """Close a call; return whether it was open."""
-        self._sent_to.pop(number, None)
-        sequence = self._calls.pop(number, None)
-        if sequence:
-            self._by_sequence.pop(sequence, None)
-        return sequence is not None
+    def _drop(self, pending: PendingCall) -> bool:
+        """Close a call; return whether it was open. The lock is held."""
+        route: _Route | None
+        route, pending.route = pending.route, None
+        if route is not None and route.key is not None:
+            self._calls.pop(route.key, None)
+        return route is not None
 
-    def _answer(self, number: int, scheme: Scheme, data: bytes | memoryview) -> None:
-        self._on_reply(number, without_header(data) if scheme is Scheme.HEADER else data, "")
+    def _answer(self, pending: PendingCall, scheme: Scheme, data: bytes | memoryview) -> None:
+        pending.answer(without_header(data) if scheme is Scheme.HEADER else data)
 
-    def _fail(self, number: int, error: str) -> None:
+    def _fail(self, pending: PendingCall, error: str) -> None:
         with self._lock:
-            known = self._drop(number)
+            known = self._drop(pending)
         if known:
-            self._on_reply(number, None, error)
+            pending.fail(error)
 
     def _route(self) -> Scheme | None:
         """Return how to send requests; None if no server is linked."""
@@ -361,9 +364,8 @@ class DdsRequester(Requester):
         with self._lock:
             self._linked = linked = self._readers()
             everybody = frozenset().union(*linked.values())
-            self._sent_to = {
-                number: readers & everybody for number, readers in self._sent_to.items()
-            }
+            for pending in self._calls.values():
+                pending.route.readers &= everybody
         now = time.monotonic()
         self._scheme = self._route()
         until = [since + _ANSWERLESS_S for since in self._unlinked.values()]

@@ -13,7 +13,6 @@ import socket
 import struct
 import threading
 import time
-from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -36,8 +35,8 @@ from rosglass.wires.tcpros.master import reason_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from rosglass.comm.service_client import PendingCall
-    from rosglass.comm.wire import OnReply
+    from rosglass.comm.service_client import PendingCalls
+    from rosglass.comm.wire import PendingCall
     from rosglass.messages import ServiceType
     from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.master import Master
@@ -59,27 +58,11 @@ _length = struct.Struct("<I")
 _MAX_LINKS = 64
 
 
-@dataclass(eq=False, slots=True)
-class _Route:
-    """The progress of a request.
-
-    Attributes:
-        made: Monotonic time of the call.
-        began: Monotonic time at which its connection was dialled or chosen; None while queued.
-        link: The connection it is sent through.
-        refused: Whether a server that was found before this call has refused it.
-    """
-
-    made: float
-    began: float | None = None
-    link: ServiceLink | None = None
-    refused: bool = False
-
-
 class TcprosRequester(ServiceRequester):
     """Sends a service client's requests to the server that the master lists.
 
     The loop's thread owns the connections, and runs everything but the methods that clients call.
+    The `route` of a call is the connection that it is sent through.
 
     Args:
         core: The node it belongs to.
@@ -89,7 +72,7 @@ class TcprosRequester(ServiceRequester):
             None uses the type that the server announces.
         persistent: Whether calls use one connection, one after the other, instead of a connection
             each.
-        on_reply: Called with the result of each request.
+        calls: The calls that have not ended.
         on_change: Called when a server may have appeared or left.
     """
 
@@ -102,16 +85,14 @@ class TcprosRequester(ServiceRequester):
         name: str,
         wanted: ServiceType | str | None,
         persistent: bool,
-        on_reply: OnReply,
+        calls: PendingCalls,
         on_change: Callable[[], None],
     ) -> None:
         self._core, self._name, self._persistent = core, name, persistent
-        self._on_reply, self._on_change = on_reply, on_change
+        self._calls, self._on_change = calls, on_change
         self._finder = ServiceFinder(core, on_server, name, wanted, self)
         #: Guards which request a connection is for: calling threads send through idle ones.
         self._lock = threading.Lock()
-        #: Requests that wait for a connection, in the order of the calls; changed with the lock.
-        self._queue: deque[PendingCall] = deque()
         #: The persistent connection; claimed for a request with the lock.
         self._kept: ServiceLink | None = None
         #: Belongs to the loop's thread.
@@ -144,7 +125,7 @@ class TcprosRequester(ServiceRequester):
 
     def delay(self, pending: PendingCall) -> str:
         """Return why a request is not sent yet, apart from conflicts."""
-        if pending.route is not None and pending.route.began is not None:
+        if not pending.waiting:
             return "its server has not accepted the connection"
         busy = len(self._links)
         if busy:
@@ -166,55 +147,37 @@ class TcprosRequester(ServiceRequester):
 
         The former saves two thread switches per call, most of its time.
         """
-        route = pending.route = _Route(time.monotonic())
-        link = self._kept
+        link, claimed = self._kept, False
         usable = link is not None and link.peer is not None and self._fits(link, pending.type)
         with self._lock:
-            if link is not None and usable and not self._queue:
+            if link is not None and usable and self._calls.first() is None:
                 taken = link.request is not None or link.settling or link.ended
                 if not taken and not pending.call.done() and link.has_nothing_to_read():
-                    link.request, route.link = pending, link
-                    route.began = time.monotonic()
-            if route.link is None:
-                self._queue.append(pending)
-        if route.link is not None:
-            self._send(route.link, pending)
-            return
-        if pending.call.done():
-            self.forget(pending)  # it ended before this
-        self._core.loop.call(self._advance)
-
-    def withdraw(self, pending: PendingCall) -> bool:
-        """Remove a request from the queue; return False if it is being sent already."""
-        with self._lock:
-            if pending not in self._queue:
-                return False
-            self._queue.remove(pending)
-        return True
+                    link.request, pending.route, claimed = pending, link, True
+        if link is not None and claimed:
+            self._send(link, pending)
+        else:
+            self._calls.enqueue(pending)
+            self._core.loop.call(self._advance)
 
     def forget(self, pending: PendingCall) -> None:
-        """Drop the request of a call that has ended, or its response."""
-        route = pending.route
-        if route is not None and (route.link is not None or route.began is None):
+        """Drop the response to a call that has ended."""
+        if pending.route is not None:
             self._core.loop.call(lambda: self._release(pending))
 
     # -- sending, in the loop's thread -------------------------------------------------------------
 
     def _release(self, pending: PendingCall) -> None:
-        link = pending.route.link
+        link: ServiceLink | None = pending.route
         if link is not None and link.request is pending:
             # Given up: a late response must not be taken for another call's, and the next call
             # must look up the server again.
             link.request, self._finder.asked = None, 0.0
             link.end("")
-        else:
-            with self._lock:
-                if pending in self._queue:
-                    self._queue.remove(pending)
 
     def _advance(self) -> None:
         """Send queued requests, in order, if there is a server."""
-        while self._queue and not self._closed:
+        while (pending := self._calls.first()) is not None and not self._closed:
             service_type, location = self.type, None
             link = self._free_link() if self._persistent else None
             if link is None:
@@ -226,19 +189,18 @@ class TcprosRequester(ServiceRequester):
             if service_type is None:
                 return  # it is being requested from the server
             with self._lock:
-                if not self._queue or (link is not None and link.request is not None):
+                if link is not None and link.request is not None:
                     return
-                pending = self._queue.popleft()
-                route = pending.route
-                route.began = time.monotonic()
+                if not self._calls.take(pending):
+                    continue  # it has just ended
                 if link is not None:
-                    link.request, route.link = pending, link
+                    link.request, pending.route = pending, link
             error = self._prepare(pending, service_type)
             if error is not None or pending.call.done():
                 if link is not None:
-                    link.request = route.link = None
+                    link.request = pending.route = None
                 if error is not None:
-                    self._on_reply(pending.number, None, error)
+                    pending.fail(error)
             elif link is not None:
                 self._send(link, pending)
             elif location is not None:
@@ -252,11 +214,12 @@ class TcprosRequester(ServiceRequester):
                 self._core, self._name, service_type, location, self._persistent, self
             )
         except OSError as error:  # no more sockets, or an address family without support
-            self._put_back(pending)
+            self._calls.enqueue(pending)
             self._finder.fail(location, error.strerror or str(error))
         else:
             self._links.add(link)
-            link.request, pending.route.link = pending, link
+            link.request, pending.route = pending, link
+            link.is_current = self._finder.asked >= pending.made
             self._kept = link if self._persistent else None
 
     def _free_link(self) -> ServiceLink | None:
@@ -288,14 +251,6 @@ class TcprosRequester(ServiceRequester):
         pending.sent = time.monotonic()
         link.send(pending.encode(link.type))
 
-    def _put_back(self, pending: PendingCall) -> None:
-        """Queue a request again that could not be sent, in its order."""
-        with self._lock:
-            pending.route.began = None
-            waiting = sorted((*self._queue, pending), key=lambda one: one.number)
-            self._queue.clear()
-            self._queue.extend(waiting)
-
     # -- events of connections, in the loop's thread -----------------------------------------------
 
     def on_accepted(self, link: ServiceLink, peer: ServerInfo) -> None:
@@ -321,13 +276,12 @@ class TcprosRequester(ServiceRequester):
         else:
             link.end("")
         if pending is not None:
-            pending.route.link = None
+            pending.route = None
             if ok:
-                self._on_reply(pending.number, data, "")
+                pending.answer(data)
             else:
                 text = bytes(data).decode("utf-8", "replace").strip()
-                reason = text or "its server reports a failure without a reason"
-                self._on_reply(pending.number, None, reason)
+                pending.fail(text or "its server reports a failure without a reason")
 
     def _settle(self, link: ServiceLink) -> None:
         link.settling = False
@@ -340,16 +294,14 @@ class TcprosRequester(ServiceRequester):
             link.ended = True
             pending, link.request = link.request, None
         if pending is not None:
-            route = pending.route
-            route.link = None
+            pending.route = None
             if pending.sent is not None:
-                self._on_reply(pending.number, None, self._loss(pending.sent, reason))
-            elif link.refusal and (route.refused or self._finder.asked >= route.made):
+                pending.fail(self._loss(pending.sent, reason))
+            elif link.refusal and link.is_current:
                 self._explain(pending, link)
-            elif not pending.call.done():
-                # Refused at a location from before the call: the server may have moved.
-                route.refused = bool(link.refusal)
-                self._put_back(pending)
+            else:
+                # If refused at a location from before the call, the server may have moved.
+                self._calls.enqueue(pending)
         if self._closed:
             return
         if reason:
@@ -374,7 +326,7 @@ class TcprosRequester(ServiceRequester):
             called = f"it was called as {link.type.name} with md5 {link.type.md5}"
             why = self._finder.mismatch() or f"{called}: {link.refusal}"
             refused = f"{link.location.uri} refuses the call of {self._name}: {why}"
-            self._on_reply(pending.number, None, ServiceError(refused))
+            pending.fail(ServiceError(refused))
 
         try:
             probe(self._core, self._name, link.location, fail)
@@ -386,7 +338,7 @@ class TcprosRequester(ServiceRequester):
     @property
     def is_awaited(self) -> bool:
         """True while calls or threads wait for the server."""
-        return bool(self._queue) or (bool(self.waiters) and not self.ready())
+        return self._calls.first() is not None or (bool(self.waiters) and not self.ready())
 
     @property
     def has_connections(self) -> bool:
@@ -418,8 +370,6 @@ class TcprosRequester(ServiceRequester):
         self._core.loop.call(self._end)
 
     def _end(self) -> None:
-        with self._lock:
-            self._queue.clear()
         for link in list(self._links):
             link.request = None
             link.end("")
@@ -444,6 +394,7 @@ class ServiceLink:
     Attributes:
         type: The service type.
         location: The server's location.
+        is_current: Whether that was looked up after the call for which the connection was made.
         peer: What the server announces; None until its header is received.
         refusal: Why the server refuses the connection; empty if it does not.
         request: The call that it is used for; None when it is idle.
@@ -464,7 +415,7 @@ class ServiceLink:
         self.peer: ServerInfo | None = None
         self.refusal = ""
         self.request: PendingCall | None = None
-        self.settling = self.ended = False
+        self.is_current = self.settling = self.ended = False
         self._owner = owner
         header = {
             "callerid": core.name.full,

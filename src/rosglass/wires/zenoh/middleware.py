@@ -25,7 +25,6 @@ from rosglass.comm import (
 from rosglass.comm.timers import Timers
 from rosglass.comm.wire import (
     Middleware,
-    OnReply,
     OnRequest,
     OnSample,
     Reader,
@@ -222,10 +221,10 @@ class ZenohMiddleware(Middleware):
             ZenohReader(self, token, endpoint, on_sample, self._drain, self._poller, self._readers)
         )
 
-    def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> Requester:
+    def create_requester(self, endpoint: EndpointInfo) -> Requester:
         """Declare a client's queriers and its token."""
         token = self._token(endpoint)
-        return self._add(ZenohRequester(self, token, endpoint, on_reply, self._servers))
+        return self._add(ZenohRequester(self, token, endpoint, self._servers))
 
     def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> Replier:
         """Declare a server's queryables and its token."""

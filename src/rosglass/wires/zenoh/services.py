@@ -26,8 +26,8 @@ from rosglass.comm import ConnectionState, EndpointKind
 from rosglass.comm.wire import (
     CALL_DROPPED,
     SERVER_LEFT,
-    OnReply,
     OnRequest,
+    PendingCall,
     Replier,
     Requester,
     RequestId,
@@ -118,8 +118,8 @@ _LAST_REPLY_TIMEOUT_S = 0.5
 
 
 @dataclass
-class _Call:
-    """A call that waits for its reply.
+class _Query:
+    """The query of a call that waits for its reply.
 
     Attributes:
         cancel: Cancels the query.
@@ -137,14 +137,14 @@ class _Call:
 class _ReplyHandler:
     """Handles the replies to one query; Zenoh keeps it until the query ends."""
 
-    __slots__ = ("__weakref__", "_number", "_requester")
+    __slots__ = ("__weakref__", "_pending", "_requester")
 
-    def __init__(self, requester: ZenohRequester, number: int) -> None:
-        self._requester, self._number = requester, number
+    def __init__(self, requester: ZenohRequester, pending: PendingCall) -> None:
+        self._requester, self._pending = requester, pending
 
     def __call__(self, reply: zenoh.Reply) -> None:
         try:
-            self._requester.on_reply(self._number, reply)
+            self._requester.on_reply(self._pending, reply)
         except Exception:  # noqa: BLE001 - Zenoh would only print it
             _log.exception("handling a reply failed")
 
@@ -152,7 +152,7 @@ class _ReplyHandler:
 class _QueryEnd(weakref.ref[_ReplyHandler]):
     """A weak reference that records the end of a query, without running code on that thread."""
 
-    number: int
+    pending: PendingCall
 
 
 class ZenohRequester(Declaration, Requester):
@@ -162,7 +162,6 @@ class ZenohRequester(Declaration, Requester):
         owner: The middleware.
         token: The client's token.
         endpoint: The client.
-        on_reply: Handles the replies.
         own_servers: The servers of the same node, which are called directly.
     """
 
@@ -171,17 +170,15 @@ class ZenohRequester(Declaration, Requester):
         owner: Owner,
         token: str,
         endpoint: EndpointInfo,
-        on_reply: OnReply,
         own_servers: LocalRegistry[ZenohReplier],
     ) -> None:
         super().__init__(owner, token)
         self._service, self._own_servers = Service(owner.options, endpoint), own_servers
         self._gid = gid_of(token)
-        self._on_reply = on_reply
         self._session: zenoh.Session | None = None
         self._queriers: dict[str, zenoh.Querier] = {}
         self._known_route: tuple[int, tuple[str, set[bytes]]] = -1, ("", set())
-        self._calls: dict[int, _Call] = {}
+        self._calls: dict[PendingCall, _Query] = {}
         self._ended: deque[weakref.ref[_ReplyHandler]] = deque()
 
     @property
@@ -206,45 +203,44 @@ class ZenohRequester(Declaration, Requester):
         """
         return bool(self._local_servers()) or bool(self._route()[1])
 
-    def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
+    def send(self, pending: PendingCall, data: bytes | bytearray) -> None:
         """Send a request; see :meth:`rosglass.comm.wire.Requester.send`."""
         own, (key, others) = self._local_servers(), self._route()
         servers = others | {replier.gid for replier in own}
-        call = _Call(zenoh.CancellationToken(), servers)
+        query = _Query(zenoh.CancellationToken(), servers)
         session = self._session
         if session is None and not own:
             raise ConnectionLostError(f"{self._service.name}: not linked with anything yet")
         with self._lock:
             if self._closed:
                 raise NodeClosedError(f"the client of {self._service.name} is closed")
-            self._calls[number] = call
+            self._calls[pending] = query
         if not servers:
             # Zenoh would end the query without a reply.
-            self._fail(number, SERVER_LEFT)
+            self._fail(pending, SERVER_LEFT)
         if session is not None and others:
-            limit = _NO_TIMEOUT_S if timeout is None else timeout + _TIMEOUT_MARGIN_S
-            self._query(session, key, number, call, data, limit)
+            self._get(session, key, pending, query, data)
         for replier in own:
             request = OpenRequest(
-                partial(self.on_response, number),
-                partial(self._on_local_refusal, number, replier.gid),
+                partial(self.on_response, pending),
+                partial(self._on_local_refusal, pending, replier.gid),
                 lambda: None,  # the client notices that the server has left
             )
-            replier.on_local_request(RequestId(self._gid, number, request), bytes(data))
+            replier.on_local_request(RequestId(self._gid, pending.number, request), bytes(data))
 
-    def forget(self, number: int) -> None:
+    def forget(self, pending: PendingCall) -> None:
         """Cancel a call, and drop its reply."""
-        call = self._calls.pop(number, None)
-        if call is not None:
-            call.cancel.cancel()  # type: ignore[no-untyped-call]
+        query = self._calls.pop(pending, None)
+        if query is not None:
+            query.cancel.cancel()  # type: ignore[no-untyped-call]
 
     def on_server_left(self, gid: bytes) -> None:
         """Fail the calls that only this server could answer; called when it leaves the graph."""
-        for call in tuple(self._calls.values()):
-            if gid in call.servers:
-                call.servers.discard(gid)
-                if not call.servers:
-                    call.lost = time.monotonic() + _LAST_REPLY_TIMEOUT_S
+        for query in tuple(self._calls.values()):
+            if gid in query.servers:
+                query.servers.discard(gid)
+                if not query.servers:
+                    query.lost = time.monotonic() + _LAST_REPLY_TIMEOUT_S
 
     def poll(self) -> None:
         """Fail the calls that cannot be answered any more; called about once a second."""
@@ -253,67 +249,70 @@ class ZenohRequester(Declaration, Requester):
         while self._ended:
             end = self._ended.popleft()
             assert isinstance(end, _QueryEnd)
-            self._fail(end.number, CALL_DROPPED)
+            self._fail(end.pending, CALL_DROPPED)
         now = time.monotonic()
-        for number, call in tuple(self._calls.items()):
-            if call.lost is not None and now > call.lost:
-                self._fail(number, SERVER_LEFT)
+        for pending, query in tuple(self._calls.items()):
+            if query.lost is not None and now > query.lost:
+                self._fail(pending, SERVER_LEFT)
 
     def close(self) -> None:
         """Undeclare the client, and cancel its calls."""
         super().close()
-        for number in tuple(self._calls):
-            self.forget(number)
+        for pending in tuple(self._calls):
+            self.forget(pending)
 
-    def on_reply(self, number: int, reply: zenoh.Reply) -> None:
+    def on_reply(self, pending: PendingCall, reply: zenoh.Reply) -> None:
         """Handle a reply to a query."""
         sample = reply.ok
         if sample is not None:
             attached = sample.attachment
             note = NO_ATTACHMENT if attached is None else Attachment.decode(attached.to_bytes())
-            if note.gid == self._gid and note.sequence != number:
+            if note.gid == self._gid and note.sequence != pending.number:
                 _log.warning("%s: dropping the reply to another call", self._service.name)
                 return
-            self.on_response(number, sample.payload.to_bytes())
+            self.on_response(pending, sample.payload.to_bytes())
             return
-        call, error = self._calls.get(number), reply.err
-        if call is not None and error is not None:
+        query, error = self._calls.get(pending), reply.err
+        if query is not None and error is not None:
             reason = error.payload.to_bytes().decode(errors="replace")[:200]
             # Errors do not name their server.
-            self.on_refusal(number, next(iter(call.servers), b""), reason)
+            self.on_refusal(pending, next(iter(query.servers), b""), reason)
 
-    def on_response(self, number: int, data: bytes | bytearray) -> None:
+    def on_response(self, pending: PendingCall, data: bytes | bytearray) -> None:
         """Handle the first response to a request."""
-        if self._calls.pop(number, None) is not None:
-            self._on_reply(number, bytes(data), "")
+        if self._calls.pop(pending, None) is not None:
+            pending.answer(bytes(data))
 
-    def on_refusal(self, number: int, server: bytes, reason: str) -> None:
+    def on_refusal(self, pending: PendingCall, server: bytes, reason: str) -> None:
         """Fail a call once its last server has refused the request."""
-        call = self._calls.get(number)
-        if call is not None:
-            call.servers.discard(server)
-            if not call.servers:
-                self._fail(number, f"its server answered with an error: {reason}")
+        query = self._calls.get(pending)
+        if query is not None:
+            query.servers.discard(server)
+            if not query.servers:
+                self._fail(pending, f"its server answered with an error: {reason}")
 
-    def _on_local_refusal(self, number: int, server: bytes, reason: str, _: object) -> None:
-        self.on_refusal(number, server, reason)
+    def _on_local_refusal(
+        self, pending: PendingCall, server: bytes, reason: str, _: object
+    ) -> None:
+        self.on_refusal(pending, server, reason)
 
-    def _query(
+    def _get(
         self,
         session: zenoh.Session,
         key: str,
-        number: int,
-        call: _Call,
+        pending: PendingCall,
+        query: _Query,
         data: bytes | bytearray,
-        timeout: float,
     ) -> None:
-        note = Attachment(number, time.time_ns(), self._gid).encode()
-        handler = _ReplyHandler(self, number)
-        call.end = _QueryEnd(handler, self._ended.append)
-        call.end.number = number
+        note = Attachment(pending.number, time.time_ns(), self._gid).encode()
+        left = pending.left()
+        timeout = _NO_TIMEOUT_S if left is None else left + _TIMEOUT_MARGIN_S
+        handler = _ReplyHandler(self, pending)
+        query.end = _QueryEnd(handler, self._ended.append)
+        query.end.pending = pending
         callback = zenoh.handlers.Callback(handler, indirect=False)
 
-        def query() -> None:
+        def get() -> None:
             try:
                 session.get(
                     key,
@@ -326,17 +325,17 @@ class ZenohRequester(Declaration, Requester):
                     priority=zenoh.Priority.DATA_HIGH,
                     payload=data,
                     attachment=note,
-                    cancellation_token=call.cancel,
+                    cancellation_token=query.cancel,
                     allowed_destination=zenoh.Locality.REMOTE,
                 )
             except zenoh.ZError as error:
-                self._fail(number, f"Zenoh refused the request: {error}")
+                self._fail(pending, f"Zenoh refused the request: {error}")
 
-        send(query, len(data), f"{self._service.name} request")
+        send(get, len(data), f"{self._service.name} request")
 
-    def _fail(self, number: int, error: str) -> None:
-        if self._calls.pop(number, None) is not None:
-            self._on_reply(number, None, error)
+    def _fail(self, pending: PendingCall, error: str) -> None:
+        if self._calls.pop(pending, None) is not None:
+            pending.fail(error)
 
     def _local_servers(self) -> list[ZenohReplier]:
         """Return the servers of the same node, which are called directly."""
