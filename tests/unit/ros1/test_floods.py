@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import os
 import socket
 import threading
 import xmlrpc.client
@@ -112,3 +114,38 @@ def test_many_honest_peers_that_come_back_at_once_are_all_served(node):
     finally:
         for sock in socks:
             sock.close()
+
+
+def resident():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def test_an_unfinished_request_leaves_no_memory_behind(node, eventually):
+    node.create_service_server("/reset", "std_srvs/Empty", lambda _: {})
+    before = resident()
+    fields = (b"callerid=/caller", b"service=/reset", b"md5sum=*")
+    header = b"".join(len(field).to_bytes(4, "little") + field for field in fields)
+    # Python's collector may run much later.
+    gc.disable()
+    try:
+        with socket.create_connection(("127.0.0.1", place(node)[1]), 20) as caller:
+            caller.sendall(len(header).to_bytes(4, "little") + header)
+            caller.recv(4)
+            caller.sendall((2**29).to_bytes(4, "little"))
+            for _ in range(256):
+                caller.sendall(bytes(2**20))
+            eventually(lambda: resident() > before + 200 * 2**20)
+        eventually(lambda: resident() < before + 50 * 2**20)
+    finally:
+        gc.enable()
+
+
+def test_a_call_of_countless_values_is_refused(node, caplog):
+    uri, _ = place(node)
+    values = [""] * 100_000
+    with pytest.raises(xmlrpc.client.Fault, match="more than 100000 XML elements"):
+        xmlrpc.client.ServerProxy(uri).paramUpdate("/t", "/values", values)
+    assert "more than 100000 XML elements" in caplog.text
+    # A robot's model is one value.
+    long = "x" * 10_000_000
+    assert xmlrpc.client.ServerProxy(uri).paramUpdate("/t", "/robot_description", long)[0] == 1

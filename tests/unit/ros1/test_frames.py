@@ -113,6 +113,12 @@ def test_a_length_that_cannot_be_is_refused(data, what):
         Taken().give(data)
 
 
+def test_a_header_of_countless_fields_is_refused():
+    # A million of them would keep the node's loop busy for half a second.
+    with pytest.raises(DecodeError, match="more than 100 fields"):
+        Taken().give(encode_header({f"n{k}": "" for k in range(101)}))
+
+
 def test_memory_is_had_only_as_bytes_arrive():
     taken = Taken()
     taken.give(encode_header(HEADER) + struct.pack("<I", MAX_FRAME) + b"only this")

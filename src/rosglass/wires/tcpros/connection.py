@@ -55,7 +55,9 @@ __all__ = [
 #: Any type, or any md5 sum, in a connection header.
 ANY = "*"
 #: Longest accepted header in bytes, far above the definition of the largest message type.
-MAX_HEADER = 10_000_000
+MAX_HEADER = 1_000_000
+#: Most fields of one, a few times those in use: a peer must not keep the loop busy.
+_MAX_FIELDS = 100
 _length = struct.Struct("<I")
 
 
@@ -70,12 +72,15 @@ def parse_header(data: bytes | memoryview) -> dict[str, str]:
     """Return the fields of a header, given without its length.
 
     Raises:
-        DecodeError: A field reaches beyond the end, or has no ``=``.
+        DecodeError: A field reaches beyond the end or has no ``=``, or there are too many.
     """
     data = bytes(data)
     fields: dict[str, str] = {}
-    position = 0
+    position = count = 0
     while position < len(data):
+        count += 1
+        if count > _MAX_FIELDS:
+            raise DecodeError("connection header", f"more than {_MAX_FIELDS} fields")
         start = position + _length.size
         size = _length.unpack_from(data, position)[0] if start <= len(data) else len(data)
         if start + size > len(data):
@@ -417,6 +422,11 @@ class Incoming:
             self._begin(data, start, body, size)
         else:
             self._rest = data[start:]
+
+    def clear(self) -> None:
+        """Free the buffers: a peer's unfinished message may have a gigabyte."""
+        self.room, self._rest = None, b""
+        self._big, self._spare = bytearray(), []
 
     def _run_of(self, size: int) -> struct.Struct:
         """Return the struct that splits many frames of one size at once, each with its length."""
@@ -831,6 +841,8 @@ class Connection:
         """Close the socket unless a thread reads from it, which calls this again afterwards."""
         if self._turn.acquire(blocking=False):
             self._sock.close()
+            # The connection itself is cyclic garbage, which may be collected much later.
+            self._incoming.clear()
             self._turn.release()
 
     def _receive(self, resume: bool = False) -> None:

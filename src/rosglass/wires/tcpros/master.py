@@ -7,12 +7,15 @@ APIs: ROS wiki, "ROS/Master_API", "ROS/Parameter Server API", "ROS/Slave_API": e
 from __future__ import annotations
 
 import http.client
+import itertools
 import math
 import reprlib
 import socket
+import sys
+import threading
 import time
 import xmlrpc.client
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 from xml.parsers.expat import ExpatError, ParserCreate
@@ -22,7 +25,7 @@ from rosglass.errors import ConnectionLostError, ConversionError, MasterError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["Master", "call_node", "parse_xml", "reason_of"]
+__all__ = ["Master", "TooManyElementsError", "call_node", "parse_xml", "reason_of"]
 
 #: Seconds that a peer may take to answer.
 _TIMEOUT_S = 5.0
@@ -32,17 +35,30 @@ _READ_BYTES = 256 * 1024
 _SUCCESS = 1
 #: Levels of lists and namespaces that a parameter may have, far above any written by hand.
 _MAX_DEPTH = 100
+#: XML elements that other peers than the master may send at once: 30,000 values of a parameter.
+_MAX_ELEMENTS = 100_000
+#: Parsing keeps Python busy: texts of a hundred peers, parsed at once, would stop the interface.
+_parsing = threading.Lock()
 #: Errors of a kept connection that the peer has closed.
 _STALE = (http.client.RemoteDisconnected, ConnectionResetError, BrokenPipeError)
 
 
-def parse_xml(data: bytes) -> tuple[tuple[Any, ...], str | None]:
+class TooManyElementsError(ExpatError):
+    """A call or answer has more XML elements than are parsed."""
+
+
+def parse_xml(data: bytes, max_elements: int = _MAX_ELEMENTS) -> tuple[tuple[Any, ...], str | None]:
     """Return the values of an XML-RPC call or answer, and the method's name.
 
     Unlike :func:`xmlrpc.client.loads`, it refuses document types, in any encoding: their entities
     can be made to fill the memory.
 
+    Args:
+        data: The text.
+        max_elements: XML elements that it may have.
+
     Raises:
+        TooManyElementsError: It has more elements.
         ExpatError: It is not XML, or has a document type.
         xmlrpc.client.Fault: It is a fault.
         Exception: It is not XML-RPC; the library raises all kinds of errors.
@@ -50,10 +66,19 @@ def parse_xml(data: bytes) -> tuple[tuple[Any, ...], str | None]:
     target = xmlrpc.client.Unmarshaller()
     target.xml("", None)  # the parser decodes the strings
     parser = ParserCreate()
-    parser.StartElementHandler, parser.EndElementHandler = target.start, target.end
+    parser.buffer_text = True  # else each line is one more call
+    count = itertools.count(1)
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        if next(count) > max_elements:
+            raise TooManyElementsError(f"more than {max_elements} XML elements")
+        target.start(tag, attributes)
+
+    parser.StartElementHandler, parser.EndElementHandler = start, target.end
     parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = target.data, _refuse_document_type
-    parser.Parse(data, True)
-    return target.close(), target.getmethodname()
+    with _parsing if max_elements < sys.maxsize else nullcontext():
+        parser.Parse(data, True)
+        return target.close(), target.getmethodname()
 
 
 def _refuse_document_type(*_: object) -> None:
@@ -144,13 +169,14 @@ class _Server:
 
     Args:
         uri: Its URI.
+        max_elements: XML elements that its answers may have.
 
     Raises:
         ConnectionLostError: The URI is not valid.
     """
 
-    def __init__(self, uri: str) -> None:
-        self.uri = uri
+    def __init__(self, uri: str, max_elements: int = _MAX_ELEMENTS) -> None:
+        self.uri, self._max_elements = uri, max_elements
         try:
             parts = urlsplit(uri)
             host, port, scheme = parts.hostname, parts.port, parts.scheme
@@ -211,7 +237,7 @@ class _Server:
             if not kept or connection.aborted:
                 raise
             data = self._exchange(connection, body)
-        values, _ = parse_xml(data)
+        values, _ = parse_xml(data, self._max_elements)
         return values[0]
 
     def _exchange(self, connection: _Connection, body: bytes) -> bytes:
@@ -337,7 +363,7 @@ class Master:
     def __init__(self, uri: str, caller: str) -> None:
         self.uri, self.caller = uri, caller
         self.reached_from = self.reached_at = ""
-        self._server = _Server(uri)
+        self._server = _Server(uri, max_elements=sys.maxsize)  # all parameters are one answer
         #: At most one connection is kept: a new one each second would cost the master a thread
         #: each. Any thread calls; every use of these is atomic.
         self._idle: list[_Connection] = []

@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 from rosglass.comm.log_limits import LogOnce
 from rosglass.interfaces import ros1_name
 from rosglass.wires.tcpros.address import is_loopback
-from rosglass.wires.tcpros.master import parse_xml
+from rosglass.wires.tcpros.master import TooManyElementsError, parse_xml
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -163,6 +163,8 @@ class Slave(socketserver.ThreadingMixIn):
             arguments, method = parse_xml(data)
             answer: Any = (dispatch(method or "", arguments),)
         except Exception as error:  # noqa: BLE001 - of garbage; answered to the caller
+            if isinstance(error, TooManyElementsError) and self._log_once.is_first("elements"):
+                _log.warning("a call of the node's API is refused: it has %s", error)
             answer = xmlrpc.client.Fault(1, f"{type(error).__name__}: {error}")
         return xmlrpc.client.dumps(answer, methodresponse=True, allow_none=True).encode()
 
