@@ -348,6 +348,22 @@ def describe_conflicts(found: Mapping[str, str]) -> str:
     return "; ".join(f"{policy}: {reason}" for policy, reason in found.items())
 
 
+def describe_mismatch(
+    peer: object, verb: str, theirs: tuple[str, str], ours: tuple[str, str]
+) -> str:
+    """Return in words that a peer uses another type, or another definition of it.
+
+    Args:
+        peer: The peer's name.
+        verb: The use, e.g. ``publishes``.
+        theirs: The peer's type and hash.
+        ours: Our type and hash.
+    """
+    if theirs[0] != ours[0]:
+        return f"{peer} {verb} {theirs[0]} here, not {ours[0]}"
+    return f"{peer} has another definition of {ours[0]} ({theirs[1]}, ours is {ours[1]})"
+
+
 def conflict_events(
     found: Mapping[EndpointInfo, Mapping[str, str]],
 ) -> Callable[[EndpointInfo, int, int, int], IncompatibleQoS | None]:

@@ -14,6 +14,7 @@ from rosglass.comm.events import (
     TopicEndpoint,
     conflict_events,
     describe_conflicts,
+    describe_mismatch,
     qos_conflicts,
 )
 from rosglass.comm.graph import EndpointInfo, EndpointKind, Graph
@@ -376,19 +377,16 @@ class Publisher(TopicEndpoint):
         problems: dict[str, None] = {}
         name = self.type.name
         for one in subscriptions:
-            if one.type != name:
-                wrong = f"{one.node} subscribes to {one.type} here, not {name}"
-                problems[f"{wrong}: it receives nothing from us"] = None
-            elif not self._has_same_hash(one):
-                effect = (
-                    "it receives our messages all the same, and may misinterpret them"
-                    if self._receives(one)
-                    else "it receives nothing from us"
-                )
-                problems[
-                    f"{one.node} has another definition of {name} ({one.type_hash}; ours is "
-                    f"{self._hash}): {effect}"
-                ] = None
+            if one.type == name and self._has_same_hash(one):
+                continue
+            theirs, ours = (one.type, one.type_hash), (name, self._hash)
+            effect = (
+                "it receives our messages all the same, and may misinterpret them"
+                if one.type == name and self._receives(one)
+                else "it receives nothing from us"
+            )
+            wrong = describe_mismatch(one.node, "subscribes to", theirs, ours)
+            problems[f"{wrong}: {effect}"] = None
         effect = (
             "it receives nothing from us"
             if self._core.middleware.matches_qos

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
+from rosglass.comm.events import describe_mismatch
 from rosglass.errors import DefinitionConflictError, Error
 from rosglass.interfaces.hashes import announced_hashes
 
@@ -100,11 +101,13 @@ class Announced(Generic[_T]):
         self._set(found)
         return True
 
-    def describe_difference(self, peer: EndpointInfo) -> str:
-        """Return in words how a peer's version differs from ours, with both hashes."""
-        if peer.type_hash in self.hashes and peer.response_hash:
-            return f"of its response: {peer.response_hash}, ours is {self._response_hash}"
-        return f"{peer.type_hash}, ours is {self.hash}"
+    def describe_difference(self, peer: EndpointInfo, verb: str) -> str:
+        """Return in words how a peer's type or version differs; see :func:`mismatches`."""
+        theirs, ours = peer.type_hash, self.hash
+        if theirs in self.hashes and peer.response_hash:
+            theirs, ours = f"of its response: {peer.response_hash}", self._response_hash
+        name = "" if self.type is None else self.type.name
+        return describe_mismatch(peer.node, verb, (peer.type, theirs), (name, ours))
 
     def is_compatible(self, peer: EndpointInfo) -> bool:
         """Return whether a peer uses this type in this version, as far as it announces them."""
@@ -135,8 +138,9 @@ class Announced(Generic[_T]):
 
     def _set(self, found: _T) -> None:
         hashes = announced_hashes(found.definition)
-        self.type, self.hash, self.hashes = found, hashes[0], frozenset(hashes)
-        self._response_hash = hashes[-1]
+        self.type, self.hash, self._response_hash = found, hashes[0], hashes[-1]
+        accepted = hashes if self._core.middleware.announces_requests else hashes[:1]
+        self.hashes = frozenset(accepted)
 
 
 def request_definition(
@@ -196,16 +200,12 @@ def mismatches(
     problems: dict[str, None] = {}
     if announced.type is None:
         return []
-    name = announced.type.name
     for peer in peers:
-        if peer.type != name:
-            problems[f"{peer.node} {verb} {peer.type} here, not {name}: {effect}"] = None
-        elif not announced.is_compatible(peer):
-            problems[
-                f"{peer.node} has another definition of {name} "
-                f"({announced.describe_difference(peer)}): {effect}; add the robot's definition "
-                "to the library"
-            ] = None
+        if not announced.is_compatible(peer):
+            known = peer.type == announced.type.name
+            remedy = "; add the robot's definition to the library" if known else ""
+            wrong = announced.describe_difference(peer, verb)
+            problems[f"{wrong}: {effect}{remedy}"] = None
     return list(problems)
 
 

@@ -10,7 +10,7 @@ import time
 from typing import TYPE_CHECKING
 
 from rosglass.comm import Durability, EndpointInfo, EndpointKind, Liveliness
-from rosglass.comm.events import describe_conflicts, qos_conflicts
+from rosglass.comm.events import describe_conflicts, describe_mismatch, qos_conflicts
 from rosglass.comm.inbox import DuplicateFilter
 from rosglass.comm.subscription import Problem, TopicMatching
 from rosglass.errors import Error
@@ -455,10 +455,13 @@ class TopicTypes:
         ours = self.type
         if ours is None:
             return
+        known = ours.name, self._hash
         others = [p for p in publishers if p.type != ours.name]
         if others:
             types = ", ".join(sorted({p.type for p in others}))
-            self.problems.append(f"{nodes_of(others)} publishes {types} here, not {ours.name}")
+            self.problems.append(
+                describe_mismatch(nodes_of(others), "publishes", (types, ""), known)
+            )
         if not self._hash:
             return
         unknown_hashes = dict.fromkeys(self._unannounced - self.accepted.keys(), "")
@@ -476,10 +479,9 @@ class TopicTypes:
                 effect = "its samples are refused until that is fetched from the robot"
             else:
                 effect = "its samples are refused; add the robot's definition to the library"
-            self.problems.append(
-                f"the publisher{who} has another definition of {ours.name} ({version}, ours is "
-                f"{self._hash}): {effect}"
-            )
+            theirs = ours.name, version
+            wrong = describe_mismatch(f"the publisher{who}", "publishes", theirs, known)
+            self.problems.append(f"{wrong}: {effect}")
 
 
 class _Failure:

@@ -581,6 +581,7 @@ def test_another_version_of_the_response_alone_is_named_and_taken(middleware, ev
         type_hash=ours.request.rihs01,
         response_hash=theirs.response.rihs01,
     )
+    middleware.announces_requests = True  # as over DDS
     library = Library()
     with Ros2Node(middleware, "fake://", "cockpit", library=library) as node:
         client, fixed = (node.create_service_client("/add", given) for given in (ADD, ours))

@@ -72,7 +72,7 @@ def test_a_publisher_names_subscriptions_of_other_definitions(node, asker, event
     publisher = node.create_publisher("/t", STRING)
     asker(type_hash=OTHER, node="other")
     problem = eventually(lambda: publisher.problem)
-    definition = f"/other has another definition of {STRING} ({OTHER}; ours is {hash_of(STRING)})"
+    definition = f"/other has another definition of {STRING} ({OTHER}, ours is {hash_of(STRING)})"
     assert f"{definition}: it receives nothing from us" in problem
     assert publisher.subscription_count() == 0
 

@@ -44,7 +44,7 @@ from rosglass.wires.zenoh.keys import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from rosglass.comm import EndpointInfo
     from rosglass.wires.zenoh.endpoints import LocalRegistry
@@ -76,22 +76,6 @@ class Service:
         if options.humble:
             names.reverse()
         self.keys = {known: topic_key(options.domain, *self.place, known) for known in names}
-
-    def describe_conflicts(self, endpoints: Sequence[EndpointInfo], effect: str) -> str:
-        """Describe the endpoints with another type or definition; empty if there are none."""
-        problems: dict[str, None] = {}
-        for endpoint in endpoints:
-            if endpoint.type != self.type:
-                problem = f"{endpoint.node} has {endpoint.type} here, not {self.type}: {effect}"
-                problems[problem] = None
-            elif (endpoint.type_hash or HUMBLE_HASH) not in self.keys:
-                problem = (
-                    f"{endpoint.node} has another definition of {self.type} "
-                    f"({endpoint.type_hash}, ours is {self.hash}): {effect}; add the robot's "
-                    "definition to the library"
-                )
-                problems[problem] = None
-        return "; ".join(problems)
 
 
 def send(job: Callable[[], None], size: int, name: str) -> None:
@@ -180,12 +164,6 @@ class ZenohRequester(Declaration, Requester):
         self._known_route: tuple[int, tuple[str, set[bytes]]] = -1, ("", set())
         self._calls: dict[PendingCall, _Query] = {}
         self._ended: deque[weakref.ref[_ReplyHandler]] = deque()
-
-    @property
-    def problem(self) -> str:  # type: ignore[override]
-        """Why some servers in the graph cannot be called."""
-        servers = self._owner.graph.endpoints(EndpointKind.SERVICE_SERVER, self._service.name)
-        return self._service.describe_conflicts(servers, "it cannot be called")
 
     def declare(self, session: zenoh.Session) -> list[Any]:
         """Declare queriers, which report whether a query will reach a server."""
@@ -468,12 +446,6 @@ class ZenohReplier(Declaration, Replier):
         self._second = without_hash(token, service.hash)
         self._has_second = False
         own_servers.add(service.place, self)
-
-    @property
-    def problem(self) -> str:  # type: ignore[override]
-        """Why some clients in the graph cannot be served."""
-        clients = self._owner.graph.endpoints(EndpointKind.SERVICE_CLIENT, self._service.name)
-        return self._service.describe_conflicts(clients, "it is not served")
 
     def declare(self, session: zenoh.Session) -> list[Any]:
         """Declare a queryable for each key."""
