@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from conftest import Bench
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+#: The simulated robot; its camera is slow, so that it leaves the processor to what is tested.
+ROBOT = [sys.executable, "-m", "rosglass.cli", "robot", "--fps", "5"]
 #: The paper's figures, and the programs that they are shown beside.
 PARTNERS = {"figure4": "pose_prediction.py", "figure5": "humanoid.py"}
 FILES = [
@@ -34,9 +36,12 @@ def world() -> Iterator[str]:
     from rosglass.wires.zenoh.router import Router
 
     with Router(f"tcp/127.0.0.1:{free_port()}") as router:
-        command = [sys.executable, "-m", "rosglass.cli", "robot", "--url", router.url, "--leash"]
         robot = subprocess.Popen(
-            command, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=sys.stderr
+            [*ROBOT, "--url", router.url, "--leash"],
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=sys.stderr,
         )
         assert robot.stdout is not None
         assert any("connected" in line for line in robot.stdout)
@@ -101,7 +106,7 @@ def test_it_runs(file: Path, world: str, screen: str, start: Any, tmp_path: Path
     from rosglass.qt import QtGui
 
     target = tmp_path / "picture.png"
-    arguments = ["run", file, "--url", world, "--screenshot", target, "--after", "2"]
+    arguments = ["run", file, "--url", world, "--screenshot", target, "--after", "1"]
     program = start(*arguments, display=screen)
     code = program.end(60)
     told = [line for line in program.lines if "WARNING" in line or "ERROR" in line]
@@ -200,10 +205,10 @@ class Operated:
 
         self.router = Router(f"tcp/127.0.0.1:{free_port()}")
         partner = PARTNERS.get(file.stem)
-        robot = ["-m", "rosglass.cli", "robot", "--url", self.router.url]
+        robot = [*ROBOT, "--url", self.router.url]
         if partner is not None:
-            robot = [str(EXAMPLES / "paper" / partner), self.router.url]
-        self.robot = subprocess.Popen([sys.executable, *robot], stdout=subprocess.DEVNULL)
+            robot = [sys.executable, str(EXAMPLES / "paper" / partner), self.router.url]
+        self.robot = subprocess.Popen(robot, stdout=subprocess.DEVNULL)
         wrapper = folder / "Operator.qml"
         wrapper.write_text(OPERATOR.replace("SOURCE", file.as_uri()))
         url = "" if file.stem == "replay" else self.router.url
