@@ -15,7 +15,7 @@ Item {
         background: Rectangle { color: "black"; opacity: 0.6 }
         color: camera.stale ? "red" : "white"
         textFormat: Text.PlainText
-        text: camera.stale ? "NO PICTURE " + camera.problem
+        text: camera.stale ? "NO IMAGE " + camera.problem
                            : camera.encoding + " over " + camera.transport + ", "
                              + camera.framerate.toFixed(0) + " Hz, " + camera.latency.toFixed(0) + " ms"
     }

@@ -48,8 +48,8 @@ Row {
         }
         Label {
             textFormat: Text.PlainText
-            text: receiver.stale ? "no picture " + sender.problem
-                                 : "the picture, " + sender.frequency.toFixed(0) + " Hz"
+            text: receiver.stale ? "no image " + sender.problem
+                                 : "the image, " + sender.frequency.toFixed(0) + " Hz"
         }
     }
 }

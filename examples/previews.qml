@@ -13,7 +13,7 @@ Grid {
         property alias angle: camera.rotation
         ImageTransportSubscription { id: camera; topic: "/camera/image_raw" }
         ImageItem { width: 240; height: 180; source: camera }
-        Label { textFormat: Text.PlainText; text: camera.stale ? "NO PICTURE" : camera.framerate.toFixed(1) + " Hz" }
+        Label { textFormat: Text.PlainText; text: camera.stale ? "NO IMAGE" : camera.framerate.toFixed(1) + " Hz" }
     }
 
     Preview { rate: 1 }

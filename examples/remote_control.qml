@@ -14,7 +14,7 @@ Item {
             property var pub: Ros2.createPublisher("/cmd_vel", "geometry_msgs/msg/Twist", Ros2.CommandQoS())
             property int stops: 0
             function axis(at, size) { return Math.max(-1, Math.min(1, 1 - 2 * at / size)) }
-            onPressedChanged: stops = 400  // for 2 s, or for 20 s while there is no picture
+            onPressedChanged: stops = 400  // for 2 s, or for 20 s while there is no image
             Component.onDestruction: if (pressed) pub.publish({})
             Timer {
                 interval: 50; repeat: true; triggeredOnStart: true; running: stick.pressed || stick.stops > 0
@@ -36,7 +36,7 @@ Item {
     }
     Label {
         textFormat: Text.PlainText; color: "red"
-        text: !camera.stale ? "" : Ros2.connectionState !== "connected" ? "NO PICTURE: " + Ros2.connectionDetail
-            : "NO PICTURE on " + camera.topic + ". " + camera.problem
+        text: !camera.stale ? "" : Ros2.connectionState !== "connected" ? "NO IMAGE: " + Ros2.connectionDetail
+            : "NO IMAGE on " + camera.topic + ". " + camera.problem
     }
 }

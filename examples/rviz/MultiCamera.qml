@@ -28,7 +28,7 @@ Panel {
     Text {
         anchors { centerIn: parent; verticalCenterOffset: -choice.height / 2 }
         visible: camera.stale
-        text: "NO PICTURE"
+        text: "NO IMAGE"
         color: Theme.bad
         font { pixelSize: 20; weight: Font.Black }
     }

@@ -100,7 +100,7 @@ def test_without_display_it_flies_by_itself_and_says_what_it_saw(tmp_path: Path,
     assert 15 < float(rates["/odom"]) < 36
     assert float(rates["/camera/image_raw"]) > 5
     assert re.search(r"median \d+\.\d ms", output)
-    assert "dropped pictures:" in output
+    assert "dropped images:" in output
     driven = re.search(r"robot: ([\d.]+) m driven", output)
     assert driven is not None
     assert float(driven[1]) > 0.5
@@ -111,8 +111,8 @@ def test_a_robot_that_never_comes_is_a_failure(tmp_path: Path, url: str) -> None
     process = start(tmp_path, "demo", "--url", url, "--seconds", "3", "--no-robot")
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 1
-    assert "no camera picture and no odometry ever arrived" in output
-    assert "not measured, no picture" in output
+    assert "no camera image and no odometry ever arrived" in output
+    assert "not measured, no image" in output
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,7 @@ def test_all_elements_show_that_the_robot_is_silent(
     wait(lambda: "STATE UNKNOWN" in dashboard.seen())
     wait(lambda: not dashboard.find("pause").isEnabled())
     wait(lambda: "following" not in dashboard.seen())
-    wait(lambda: dashboard.seen().count("NO PICTURE") == 2)
+    wait(lambda: dashboard.seen().count("NO IMAGE") == 2)
     dashboard.click("tab Behaviours")
     wait(lambda: "ROBOT SILENT" in dashboard.seen())
     assert not dashboard.find("behaviour Look around").isEnabled()

@@ -72,7 +72,7 @@ def test_it_takes_a_picture_and_ends(demo: Any, tmp_path: Path) -> None:
     output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, output
     assert "no display: RViz runs 6 s on a virtual screen" in output
-    assert f"picture of RViz: {tmp_path / 'seen.png'}" in output
+    assert f"screenshot of RViz: {tmp_path / 'seen.png'}" in output
     from rosglass.rviz.qt5 import QtGui
 
     picture = QtGui.QImage(str(tmp_path / "seen.png"))

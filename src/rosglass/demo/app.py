@@ -151,7 +151,7 @@ class Cockpit:
         gc.collect()
 
     def topics(self) -> list[Any]:
-        """Return the interface's subscriptions and pictures, one for each topic, by topic."""
+        """Return the interface's subscriptions and painted topics, one for each topic, by topic."""
         kinds = (Subscription, pictures.MapPicture, pictures.ScanPicture)
         found = {item.property("topic"): item for kind in kinds for item in self._all(kind)}
         return [found[topic] for topic in sorted(found)]
@@ -179,9 +179,9 @@ class Cockpit:
         latency = Latency.of(self.camera.latencies)
         measured = (
             f"median {latency.median:.1f} ms, 95 % within {latency.p95:.1f} ms, "
-            f"worst {latency.worst:.1f} ms ({latency.count} pictures)"
+            f"worst {latency.worst:.1f} ms ({latency.count} images)"
             if latency.count
-            else "not measured, no picture of the simulated camera was shown"
+            else "not measured, no image of the simulated camera was shown"
         )
         rows.append(
             [
@@ -197,7 +197,7 @@ class Cockpit:
             f"cockpit: {100 * self.process.cpu():.0f} % of a core, "
             f"{self.process.memory():.0f} MiB; robot: {driven:.1f} m driven"
         )
-        lines = (table(rows), "", shown, f"dropped pictures: {self.camera.missing}", cost)
+        lines = (table(rows), "", shown, f"dropped images: {self.camera.missing}", cost)
         return "\n".join(lines)
 
     def item(self, name: str) -> Any:
@@ -286,16 +286,16 @@ _MULTIMEDIA: Any = optional("QtMultimedia")
 
 __all__ = ["CameraFigures", "Latency", "ProcessFigures", "table"]
 
-#: Number of pictures whose latency is kept, for five minutes: a cockpit may run for days.
+#: Number of images whose latency is kept, for five minutes: a cockpit may run for days.
 _NEWEST = 9000
 
 
 @dataclass(frozen=True)
 class Latency:
-    """Milliseconds from a picture's stamp to its display.
+    """Milliseconds from an image's stamp to its display.
 
     Attributes:
-        count: Number of pictures.
+        count: Number of images.
         median: Half of them were faster.
         p95: 95 % were faster.
         worst: The slowest.
@@ -317,9 +317,9 @@ class Latency:
 
 
 class CameraFigures(QtCore.QObject):
-    """Follows the pictures of the simulated camera onto the screen.
+    """Follows the images of the simulated camera onto the screen.
 
-    Reads the frame code of each picture that reaches the video sink; the picture counts as
+    Reads the frame code of each image that reaches the video sink; the image counts as
     displayed at the window's next buffer swap.
 
     Args:
@@ -332,11 +332,11 @@ class CameraFigures(QtCore.QObject):
         self._sink = sink
         self._waiting: framecode.FrameCode | None = None
         self._last = -1
-        #: Seconds from stamp to screen of the newest pictures.
+        #: Seconds from stamp to screen of the newest images.
         self.latencies: deque[float] = deque(maxlen=_NEWEST)
-        #: Pictures that reached the screen's video sink.
+        #: Images that reached the screen's video sink.
         self.frames = 0
-        #: Pictures missing between the first and the last, by their sequence numbers.
+        #: Images missing between the first and the last, by their sequence numbers.
         self.missing = 0
         self._sink.videoFrameChanged.connect(self._on_frame)
         # Queued: no Python code may run on the render thread.

@@ -52,12 +52,12 @@ _DECK = (
     ((0.385, 0.195, 0.245), (58, 63, 72)),
     ((0.33, 0.07, 0.25), (214, 110, 34)),
 )
-#: Of a flipper: along it and across it, from the upper side at the axle around to the lower.
+#: Outline of a flipper, along and across it, from the upper side at the axle to the lower one.
 _FLIPPER_OUTLINE = (np.array([0.0, 0.46, 0.46, 0.0]), np.array([0.085, 0.04, -0.03, -0.085]))
 
 
 class Camera:
-    """Renders pictures of a world.
+    """Renders images of a world.
 
     Args:
         world: The world to render.
@@ -78,7 +78,7 @@ class Camera:
         self._beam = _beam()
 
     def render(self, state: RobotState, *, body: bool = True) -> Picture:
-        """Return a new picture (rows of RGB) of the view, with the robot itself if `body`."""
+        """Return a new image (rows of RGB) of the view, with the robot itself if `body`."""
         picture = np.empty((HEIGHT, WIDTH, 3), np.uint8)
         rotation, position = pose_of(state)
         self._draw_sky(picture, state)
@@ -97,12 +97,12 @@ class Camera:
         return picture
 
     def stamp(self, picture: Picture, nanoseconds: int, number: int) -> None:
-        """Burn the clock and the frame code into the picture.
+        """Burn the clock and the frame code into the image.
 
         Args:
-            picture: The picture.
-            nanoseconds: System time to encode as the time of the picture.
-            number: Its running number.
+            picture: The image.
+            nanoseconds: System time to encode as the time of the image.
+            number: The sequence number of the image.
         """
         seconds, rest = divmod(nanoseconds, 1_000_000_000)
         clock = time.strftime("%H:%M:%S", time.localtime(seconds)) + f".{rest // 1_000_000:03d}"
@@ -130,7 +130,7 @@ class Camera:
         column = (-state.yaw % (2 * math.pi)) * FOCAL - math.radians(39) * FOCAL
         if column < 0:
             column += 2 * math.pi * FOCAL
-        # Picture -> panorama: rotate by the roll around the centre, then shift.
+        # Image -> panorama: rotate by the roll around the centre, then shift.
         offset_x = column + WIDTH / 2
         offset_y = self._sky_horizon + pitch * FOCAL
         cx, cy = WIDTH / 2, HEIGHT / 2
@@ -218,7 +218,7 @@ class Camera:
         return found
 
     def _draw_body(self, picture: Picture, state: RobotState) -> None:
-        """Draw the deck and the front flippers, which reach into the picture from below."""
+        """Draw the deck and the front flippers, which reach into the image from below."""
         for (front, half, up), color in _DECK:
             deck = [(0.05, half, up), (front, half, up), (front, -half, up), (0.05, -half, up)]
             self._fill(picture, np.array(deck), color)

@@ -45,7 +45,7 @@ class Equipment:
     Args:
         node: Node that offers it.
         simulation: The robot.
-        camera: Renders pictures of its world.
+        camera: Renders images of its world.
         scanner: Its laser.
         drive: Takes metres and radians per second.
         flippers: Takes four angles.
@@ -249,8 +249,8 @@ def _ground(world: World) -> tuple[Floats, Pixels]:
             covered &= (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) >= 0
         inside |= covered
     places = np.column_stack([x, y, world.ground(x, y)])
-    telling = (np.ptp(colors, axis=1) > _COLORED) | (places[:, 2] > _RAISED)
-    kept = ~inside & (world.ramp.ground(x, y) == 0) & telling
+    visible = (np.ptp(colors, axis=1) > _COLORED) | (places[:, 2] > _RAISED)
+    kept = ~inside & (world.ramp.ground(x, y) == 0) & visible
     return places[kept], colors[kept].astype(np.uint8)
 
 

@@ -1,6 +1,6 @@
-"""A line of black and white squares in the picture that a program can read back from the screen.
+"""A line of black and white squares in the image that a program can read back from the screen.
 
-It encodes the time and the sequence number of the picture, so that the latency from the robot to
+It encodes the time and the sequence number of the image, so that the latency from the robot to
 the pixels can be measured without trusting any software in between.
 """
 
@@ -21,7 +21,7 @@ __all__ = ["BITS", "SQUARE", "FrameCode", "FrameCodeError", "draw", "read"]
 _TIME_BITS, _NUMBER_BITS, _CHECK_BITS = 28, 16, 8
 #: Squares in the line.
 BITS = _TIME_BITS + _NUMBER_BITS + _CHECK_BITS
-#: Side of a square in pixels of the picture.
+#: Side of a square in pixels of the image.
 SQUARE = 8
 # Not quite black and white: easier on the eye, and still easy to distinguish.
 _BLACK, _WHITE = 28, 226
@@ -38,8 +38,8 @@ class FrameCode:
     """The content of the squares.
 
     Attributes:
-        time: Time of the picture in units of 10 µs, modulo 2**28 (about 45 minutes).
-        number: The picture's sequence number, modulo 65536.
+        time: Time of the image in units of 10 µs, modulo 2**28 (about 45 minutes).
+        number: The image's sequence number, modulo 65536.
     """
 
     time: int
@@ -47,11 +47,11 @@ class FrameCode:
 
     @classmethod
     def at(cls, nanoseconds: int, number: int) -> FrameCode:
-        """Return the code of picture `number` taken at a system time."""
+        """Return the code of image `number` taken at a system time."""
         return cls(nanoseconds // _UNIT_NS % _WRAP, number % (1 << _NUMBER_BITS))
 
     def age(self, nanoseconds: int) -> float:
-        """Return the picture's age in seconds at a system time; valid below 45 minutes."""
+        """Return the image's age in seconds at a system time; valid below 45 minutes."""
         return (nanoseconds // _UNIT_NS - self.time) % _WRAP * _UNIT_NS * 1e-9
 
 
@@ -79,8 +79,9 @@ def read(row: npt.NDArray[np.uint8]) -> FrameCode:
             scale of at least one value per square.
 
     Raises:
-        FrameCodeError: The row is too short, or the code is incomplete or disturbed (for instance a
-            picture half replaced by the next one).
+        FrameCodeError: The row is too short, or the code is incomplete or disturbed (for instance
+            an
+        image half replaced by the next one).
     """
     if row.ndim != 1 or row.size < BITS:
         raise FrameCodeError(f"expected at least {BITS} values in one row, got shape {row.shape}")

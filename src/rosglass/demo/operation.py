@@ -112,7 +112,7 @@ class DriveGoal:
         if frame.lstrip("/") not in _FRAMES:
             refusal = f"goals are expected in the frame map, not in {frame}"
         elif not (math.isfinite(target.x) and math.isfinite(target.y)):
-            refusal = f"{target.x}, {target.y} is no place"
+            refusal = f"{target.x}, {target.y} is not a position on the map"
         else:
             refusal = self._refusal()
         self.end(PREEMPTED, "another goal came")
@@ -237,7 +237,7 @@ class Operation:
             self.goal.confirm()
 
     def take_over(self) -> None:
-        """Leave the driving to the operator, who has just sent a command."""
+        """Leave the driving to the operator after a command."""
         if self.mode == "autonomous":
             self.mode = "supervised"
         self._interruption = "the operator drives"

@@ -1,4 +1,4 @@
-"""The map and the laser scan as pictures, painted outside the GUI thread.
+"""The map and the laser scan as images, painted outside the GUI thread.
 
 QML types ``MapPicture`` and ``ScanPicture`` of the module ``RosglassDemo 1.0``. Both have a topic
 and provide a `source` for a QML ``Image``; cells and points never pass through JavaScript.
@@ -38,7 +38,7 @@ _numbers = itertools.count(1)
 
 
 def paint_map(cells: npt.NDArray[np.int8], width: int, height: int) -> QtGui.QImage:
-    """Return an occupancy grid as a picture in the cockpit's colours, north up.
+    """Return an occupancy grid as an image in the cockpit's colours, north up.
 
     Args:
         cells: Rows from south to north, -1 unknown, 0 free to 100 occupied.
@@ -64,14 +64,14 @@ def paint_map(cells: npt.NDArray[np.int8], width: int, height: int) -> QtGui.QIm
 def paint_scan(
     ranges: npt.NDArray[np.float32], start: float, step: float, size: int, metres: float
 ) -> QtGui.QImage:
-    """Return a laser scan as a picture, with the scanner in the middle, facing right.
+    """Return a laser scan as an image, with the scanner in the middle, facing right.
 
     Args:
         ranges: Distances in metres; non-finite ones are left out.
         start: Direction of the first beam, radians, counter-clockwise from ahead.
         step: Angle between two beams, radians.
-        size: Side of the picture, pixels.
-        metres: Side of the picture, metres.
+        size: Side of the image, pixels.
+        metres: Side of the image, metres.
     """
     picture = QtGui.QImage(size, size, QtGui.QImage.Format.Format_ARGB32_Premultiplied)
     picture.fill(QtCore.Qt.GlobalColor.transparent)
@@ -103,14 +103,14 @@ def paint_scan(
 
 
 class _Provider(QtQuick.QQuickImageProvider):
-    """Provides the newest picture of one element to QML's ``Image``."""
+    """Provides the newest image of one element to QML's ``Image``."""
 
     def __init__(self) -> None:
         super().__init__(QtQuick.QQuickImageProvider.ImageType.Image)
         self.picture = QtGui.QImage()
 
     def requestImage(self, name: str, size: QtCore.QSize, _: QtCore.QSize) -> QtGui.QImage:  # noqa: ARG002, N802 - Qt's
-        """Return the picture; called by Qt."""
+        """Return the image; called by Qt."""
         picture = self.picture
         size.setWidth(picture.width())
         size.setHeight(picture.height())
@@ -118,7 +118,7 @@ class _Provider(QtQuick.QQuickImageProvider):
 
 
 class _Picture(TopicElement):
-    """A topic displayed as a picture; subclasses paint it."""
+    """A topic displayed as an image; subclasses paint it."""
 
     #: Type of the messages, and profile of the subscription.
     kind: str
@@ -147,7 +147,7 @@ class _Picture(TopicElement):
 
     @abstractmethod
     def take(self, numbers: tuple[float, ...]) -> None:
-        """Set the values of the picture that is displayed from now on; on the GUI thread."""
+        """Set the values of the image that is displayed from now on; on the GUI thread."""
 
     def _wanted(self) -> tuple[Node, str] | None:
         node, topic = self.node, self._resolve(self._topic)
@@ -171,7 +171,7 @@ class _Picture(TopicElement):
         except Exception as error:  # noqa: BLE001 - shown in place of the frame
             _log.exception("%s: cannot be painted", self._topic)
             result = Error(f"internal error: {error}")
-        with suppress(RuntimeError):  # the QML object was destroyed while its picture was painted
+        with suppress(RuntimeError):  # the QML object was destroyed while its image was painted
             self._painted.emit(result)
 
     # Slots: QML elements with properties of their own hide methods that are not declared.
@@ -225,7 +225,7 @@ class _Picture(TopicElement):
         return QtCore.QUrl(f"image://{self._name}/{self._version}" if self._version else "")
 
     topic = Property(str, lambda self: self._topic, _set_topic, notify=topicChanged)
-    #: Seconds without a message after which the picture is outdated; 0 for never.
+    #: Seconds without a message after which the image is outdated; 0 for never.
     limit = Property(float, lambda self: self._stale_after_s, _set_limit, notify=limitChanged)
     source = Property(QtCore.QUrl, _source, notify=changed)
     received = Property(bool, lambda self: self._version > 0, notify=changed)
@@ -237,7 +237,7 @@ class _Picture(TopicElement):
 
 
 class MapPicture(_Picture):
-    """A ``nav_msgs/msg/OccupancyGrid`` as a picture, north up.
+    """A ``nav_msgs/msg/OccupancyGrid`` as an image, north up.
 
     `left` and `bottom` are the position of its lower left corner in the map, `metresWide` and
     `metresHigh` its size. The map's own rotation is not supported and reported as a problem.
@@ -278,9 +278,9 @@ class MapPicture(_Picture):
 
 
 class ScanPicture(_Picture):
-    """A ``sensor_msgs/msg/LaserScan`` as a picture, with the scanner in the middle, facing right.
+    """A ``sensor_msgs/msg/LaserScan`` as an image, with the scanner in the middle, facing right.
 
-    `metres` is the length of the picture's side.
+    `metres` is the length of the image's side.
     """
 
     kind, qos = "sensor_msgs/msg/LaserScan", QoS.sensor_data().with_depth(1)
@@ -295,7 +295,7 @@ class ScanPicture(_Picture):
         """Paint the scan."""
         ranges = np.asarray(message.ranges, dtype=np.float32)
         finite = ranges[np.isfinite(ranges)]
-        # Steps of a metre, so that the picture's size does not change with every scan.
+        # Steps of a metre, so that the image's size does not change with every scan.
         far = math.ceil(min(float(finite.max()), 30.0)) if finite.size else 1
         metres = 2.0 * max(1, far)
         size = round(metres * self._PIXELS_PER_METRE)
@@ -303,7 +303,7 @@ class ScanPicture(_Picture):
         return picture, (metres,)
 
     def take(self, numbers: tuple[float, ...]) -> None:
-        """Store the size of the picture."""
+        """Store the size of the image."""
         if numbers[0] != self._metres:
             self._metres = numbers[0]
             self.placed.emit()

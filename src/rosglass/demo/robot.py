@@ -1,7 +1,7 @@
 """The simulated robot as a node: its threads, topics and services, and the commands it accepts.
 
 Three threads, so that none waits for another: the body moves at 100 Hz and never sends anything;
-the reporter sends the small topics; the camera renders and sends pictures. Commands arrive on the
+the reporter sends the small topics; the camera renders and sends images. Commands arrive on the
 node's own thread and take effect with the body's next step.
 """
 
@@ -55,7 +55,7 @@ class RobotOptions:
     """The options of a robot.
 
     Attributes:
-        fps: Pictures per second, more than 0 and at most 120.
+        fps: Images per second, more than 0 and at most 120.
         raw: Whether to send ``/camera/image_raw``.
         compressed: Whether to send ``/camera/image_raw/compressed`` (while it has subscribers).
         jpeg_quality: 1 to 100.
@@ -494,7 +494,7 @@ class Services:
         """Turn on the spot to a heading; ends where it is if cancelled or stopped."""
         wanted, start = float(goal.goal.theta), self._state().yaw
         if not math.isfinite(wanted):
-            raise Error(f"the heading {wanted} is no angle")
+            raise Error(f"the heading {wanted} is not an angle")
         while not self._ending.wait(_TURN_PERIOD_S):
             state = self._state()
             remaining = math.remainder(wanted - state.yaw, math.tau)

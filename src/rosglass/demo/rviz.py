@@ -27,12 +27,12 @@ _SIZE = (1280, 800)
 _MASTER_TIMEOUT_S = 20.0
 
 
-def main(seconds: float | None = None, picture: Path | None = None) -> int:
-    """Run it until RViz is closed; without a display, for 20 s and with a picture.
+def main(seconds: float | None = None, screenshot: Path | None = None) -> int:
+    """Run it until RViz is closed; without a display, for 20 s and with a screenshot.
 
     Args:
         seconds: Seconds until it ends by itself; None to run until RViz is closed.
-        picture: File for a screenshot at that time.
+        screenshot: File for a screenshot at that time.
 
     Returns:
         RViz's exit code.
@@ -42,7 +42,7 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
     """
     files = (str(_FOLDER / "figure1.rviz"), "--overlay", str(_FOLDER / "Dashboard.qml"))
     command = ["rviz", *files, "--bare"]
-    return run_station("RViz", command, _start_master, seconds, picture, Path("rviz-demo.png"))
+    return run_station("RViz", command, _start_master, seconds, screenshot, Path("rviz-demo.png"))
 
 
 def run_station(
@@ -50,18 +50,18 @@ def run_station(
     command: Sequence[str],
     start_graph: Callable[[ExitStack], str],
     seconds: float | None,
-    picture: Path | None,
-    default_picture: Path,
+    screenshot: Path | None,
+    default: Path,
 ) -> int:
     """Run a robot and a program that shows it, until that is closed.
 
     Args:
-        name: Of the program, in messages.
-        command: Of rosglass, without ``--url``.
+        name: Name of the program, in messages.
+        command: Command of rosglass, without ``--url``.
         start_graph: Starts what both connect to; returns its URL.
         seconds: Seconds until it ends by itself; None to run until it is closed.
-        picture: File for a screenshot at that time.
-        default_picture: That file where there is no display.
+        screenshot: File for a screenshot at that time.
+        default: That file where there is no display.
 
     Returns:
         The program's exit code.
@@ -71,7 +71,7 @@ def run_station(
     """
     headless = not os.environ.get("DISPLAY")
     if headless:
-        seconds, picture = seconds or 20.0, picture or default_picture
+        seconds, screenshot = seconds or 20.0, screenshot or default
     with ExitStack() as stack:
         received = _note_signals(stack)
         if headless:
@@ -85,14 +85,19 @@ def run_station(
         stack.callback(robot.close)
         ending = []
         if seconds is not None:
-            ending = ["--screenshot", str(picture or default_picture), "--after", str(seconds)]
+            ending = [
+                "--screenshot",
+                str(screenshot or default),
+                "--after",
+                str(seconds),
+            ]
         whole = [*LEASH, sys.executable, "-m", "rosglass", *command, "--url", url, *ending]
         program = Child(whole, name)
         # Both at once: the user has closed the program, and waits.
         stack.callback(_close, program, robot)
         code = _wait(program, received)
-        if ending and code == 0:  # it fails without a picture
-            print(f"picture of {name}: {Path(ending[1]).resolve()}")
+        if ending and code == 0:  # it fails without a screenshot
+            print(f"screenshot of {name}: {Path(ending[1]).resolve()}")
         return code
 
 

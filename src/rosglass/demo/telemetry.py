@@ -269,7 +269,7 @@ def diagnostics(
         state: The robot.
         stamp: Now.
         frames_per_second: The camera's rate.
-        render_time: Time to render a picture, seconds.
+        render_time: Time to render an image, seconds.
         rejected: Commands refused since the start.
     """
     if state.emergency_stop:
@@ -288,7 +288,7 @@ def diagnostics(
         power = (_OK, "charging" if state.charging else "good")
     slope = math.degrees(max(abs(state.roll), abs(state.pitch)))
     steep = (_WARN, f"steep: {slope:.0f}°") if slope > 12 else (_OK, "level enough")
-    camera = (_OK, "streaming") if frames_per_second > 5 else (_ERROR, "no pictures")
+    camera = (_OK, "streaming") if frames_per_second > 5 else (_ERROR, "no images")
     commands = (_OK, "none refused") if not rejected else (_WARN, f"{rejected} refused as garbage")
     return {
         "header": header(stamp, ""),

@@ -19,12 +19,12 @@ __all__ = ["main"]
 _FOLDER = Path(__file__).parents[3] / "examples/rviz"
 
 
-def main(seconds: float | None = None, picture: Path | None = None) -> int:
-    """Run it until the view is closed; without a display, for 20 s and with a picture.
+def main(seconds: float | None = None, screenshot: Path | None = None) -> int:
+    """Run it until the view is closed; without a display, for 20 s and with a screenshot.
 
     Args:
         seconds: Seconds until it ends by itself; None to run until the view is closed.
-        picture: File for a screenshot at that time.
+        screenshot: File for a screenshot at that time.
 
     Returns:
         The exit code of ``rosglass view``.
@@ -33,7 +33,9 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
         Error: The router does not start.
     """
     command = ["view", str(_FOLDER / "figure1.rviz"), "--overlay", str(_FOLDER / "Dashboard.qml")]
-    return run_station("the view", command, _start_router, seconds, picture, Path("view-demo.png"))
+    return run_station(
+        "the view", command, _start_router, seconds, screenshot, Path("view-demo.png")
+    )
 
 
 def _start_router(stack: ExitStack) -> str:

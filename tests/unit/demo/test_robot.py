@@ -260,7 +260,7 @@ def test_no_goal_overrides_the_emergency_stop(node: StubNode, robot: Robot) -> N
     node.command("/emergency_stop", data=True)
     with pytest.raises(Error, match="emergency stop"):
         node.services["/turn"](Turning(robot.state.yaw + 1.0))
-    with pytest.raises(Error, match="no angle"):
+    with pytest.raises(Error, match="not an angle"):
         node.services["/turn"](Turning(math.nan))
 
 

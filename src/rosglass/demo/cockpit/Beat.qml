@@ -1,5 +1,5 @@
-// When the screen changes: with each camera picture, so that one redraw serves everything, and ten
-// times a second when there is no picture. What cannot wait does not wait for it.
+// Sets when the screen changes: with each camera image, so that one redraw serves everything, and ten
+// times a second without images. Urgent changes do not wait for it.
 pragma Singleton
 import QtQuick
 

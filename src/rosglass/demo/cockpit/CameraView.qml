@@ -1,5 +1,5 @@
-// The camera picture. It never passes off an old picture as live: once pictures stop, or arrive
-// late, it turns grey under a red frame that says how old they are.
+// The camera image. An old image is never shown as live: once images stop, or arrive late, it turns
+// grey under a red frame that says how old they are.
 import QtQuick
 import Ros2 1.0
 
@@ -8,24 +8,24 @@ Item {
 
     property alias topic: camera.topic
     property alias transport: camera.defaultTransport
-    // Why there may be no picture at all, from the connection.
+    // Why images may be missing altogether, from the connection.
     property string reason
-    // Seconds that a picture may be shown as live after it came: at 30 pictures a second, the
-    // loss of fifteen is no hiccup any more.
+    // Seconds that an image may be shown as live after its arrival: at 30 images a second, losing
+    // fifteen is more than a hiccup.
     property real limit: 0.5
     property bool received: false
     property double stamp: 0
     property real age: -1
-    // Milliseconds from the robot's stamp to here. More than a second is a picture of the past, or
+    // Milliseconds from the robot's stamp to here. More than a second means an old image, or
     // clocks too far apart to distinguish the two: neither may be shown as live.
     readonly property real latency: camera.latency
     readonly property bool late: received && !camera.stale && Math.abs(latency) > 1000
     readonly property bool live: received && age <= limit && !camera.stale && !late
-    // -1 for unknown: the stream's is a mean over some pictures, and of an interruption among them.
+    // -1 for unknown: the stream's is a mean over some images, including an interruption among them.
     readonly property real framerate: settled ? camera.framerate : -1
     property bool settled: false
     onLiveChanged: settled = false
-    // Where the picture is, in this item's coordinates.
+    // The rectangle of the image, in this item's coordinates.
     readonly property rect pictureRect: output.contentRect
 
     ImageTransportSubscription {
@@ -33,10 +33,10 @@ Item {
         objectName: "cameraStream"
         topic: "/camera/image_raw"
         defaultTransport: "raw"
-        // The last picture stays, so that the operator can see where the robot was; that it is
-        // old is said below.
+        // The last image stays, so that the operator can see where the robot was; the frame says
+        // that it is old.
         timeout: 0
-        // The figures are read from the pixels of the picture.
+        // The figures are read from the pixels of the image.
         fullResolution: true
     }
     Connections {
@@ -57,7 +57,7 @@ Item {
         interval: 100
         running: view.received
         repeat: true
-        // It grows even when the clock is set back, so that no picture that stands still is live.
+        // It grows even when the clock is set back, so that a frozen image never counts as live.
         onTriggered: view.age = Math.max(view.age + interval / 1000, (Date.now() - view.stamp) / 1000)
     }
 
@@ -151,7 +151,7 @@ Item {
                     objectName: "noSignalText"
                     anchors.horizontalCenter: parent.horizontalCenter
                     textFormat: Text.PlainText
-                    text: !view.received ? "no picture received yet"
+                    text: !view.received ? "no image received yet"
                         : view.late
                             ? "by " + Math.abs(view.latency / 1000).toFixed(1) + " s"
                             : "last image " + view.age.toFixed(1) + " s old"

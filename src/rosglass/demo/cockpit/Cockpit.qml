@@ -20,22 +20,22 @@ Item {
     // Whether the window is the one that gets the keys.
     property bool inFront: true
     readonly property bool wide: width > 1.15 * height
-    // Whether the panels have room; in a smaller window only picture, stick and stop are left.
+    // True if the panels have room; a smaller window shows only the image, the stick and the stop.
     readonly property bool roomy: wide ? width >= 620 && height >= 400
                                        : width >= 440 && height >= (cramped ? 640 : 520)
     readonly property real tall: height - bar.height - 2 * Theme.gap
-    // What a picture of 4:3 in full height leaves over.
+    // The width beside an image of 4:3 in full height.
     readonly property real sideWidth: Math.max(280, Math.min(420, width - 3 * Theme.gap - tall * 4 / 3))
     readonly property real cameraWidth: width - 2 * Theme.gap
         - (wide && roomy ? sideWidth + Theme.gap : 0)
-    // On a picture this small the controls would hide one another: they go below it.
+    // On an image this small the controls would hide one another: they go below it.
     readonly property bool cramped: width - 2 * Theme.gap - (wide ? sideWidth + Theme.gap : 0) < 520
     readonly property real strip: cramped && roomy ? 140 : 0
     readonly property real cameraTall: !roomy || wide && !cramped ? tall
         : Math.min(cameraWidth * 0.75, tall - strip - (wide ? 0 : Math.max(200, tall * 0.36) + Theme.gap))
     readonly property real control: strip > 0 ? strip - 20
         : Math.min(width * 0.36, tall * 0.6, Math.max(110, Math.min(170, cameraTall * 0.24)))
-    // How far the controls stay above the picture's lower edge, where its clock is.
+    // Distance of the controls from the image's lower edge, where its clock is.
     readonly property real rim: camera.height - camera.pictureRect.y - camera.pictureRect.height
         + camera.pictureRect.height * 26 / 480 + 12
     readonly property real margin: cockpit.cramped ? 6 : 22
@@ -95,7 +95,7 @@ Item {
         objectName: "drive"
         reachable: link.alive
         obstacle: stop.blocks ? "emergency stop"
-            : !camera.live ? "no live picture"
+            : !camera.live ? "no live image"
             : !link.alive ? "no robot"
             : !cockpit.inFront ? "window not in front" : ""
     }
@@ -214,7 +214,7 @@ Item {
         id: speed
         objectName: "speed"
         anchors { horizontalCenter: camera.horizontalCenter; bottom: camera.bottom; bottomMargin: cockpit.rim }
-        // On a small picture it would hide why there is none.
+        // On a small image it would hide the reason for a missing one.
         visible: cockpit.roomy && (camera.live || refused || cockpit.strip === 0)
         room: camera.width - 20 - (cockpit.strip > 0 ? 0 : 2 * cockpit.control + 100)
         odom: map.odom

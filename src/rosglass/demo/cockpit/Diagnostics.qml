@@ -7,9 +7,9 @@ Panel {
     title: "Diagnostics"
     fresh: feed.fresh
     age: feed.age
-    // Seconds after which what a part said last is no news of it any more.
+    // Seconds after which a part's last report counts as outdated.
     readonly property real limit: 5
-    // Of more parts, only how many there are is kept.
+    // Maximum number of parts; further ones are only counted.
     readonly property int most: 200
     // What each part said last, by its name and hardware: several nodes report, each its own parts.
     property var parts: ({})

@@ -2,7 +2,7 @@
 //
 // Sends 20 times a second while a stick or key is held; several zeros when it is let go, however
 // that happens, and for as long as the robot is lost; nothing otherwise, so that others may drive.
-// Once blocked (emergency stop, no picture, window not in front) it stays off until everything was
+// Once blocked (emergency stop, no live image, window not in front) it stays off until everything was
 // let go.
 import QtQuick
 import Ros2 1.0

@@ -12,7 +12,7 @@ QtObject {
     property alias queueSize: subscription.queueSize
     // Seconds without a message after which the one received last is no longer true.
     property real limit: 0.7
-    // Whether to show a message at once instead of together with the next camera picture.
+    // True to show a message at once instead of together with the next camera image.
     property bool urgent: false
     property var message: undefined
     readonly property bool received: message !== undefined
