@@ -177,6 +177,22 @@ def test_throttling_keeps_its_rate(live: Any, wait: Any) -> None:
         thread.join()
 
 
+def test_last_message_of_a_lost_publisher_is_stale(running: Any, chat: Any, wait: Any) -> None:
+    """The graph may overtake it: on a busy machine, or as here while it is held back."""
+    root = load(running, 'topic: "/chat"; throttleRate: 1; timeout: 0')
+    sub = root.property("sub")
+    wait(lambda: sub.property("subscribed") and chat.subscription_count())
+    chat.publish(data="first")
+    wait(lambda: root.property("shown") == "first" and not sub.property("stale"))
+    chat.publish(data="last")
+    chat.close()
+    wait(lambda: root.property("shown") == "last" and sub.property("stale"))
+    successor = running.robot.create_publisher("/chat", TEXT)
+    wait(successor.subscription_count)
+    successor.publish(data="next")
+    wait(lambda: root.property("shown") == "next" and not sub.property("stale"))
+
+
 def test_what_a_full_queue_drops_is_counted(running: Any, chat: Any, wait: Any) -> None:
     root = load(running, 'topic: "/chat"; throttleRate: 0; queueSize: 2')
     sub = root.property("sub")

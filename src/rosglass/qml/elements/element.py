@@ -346,6 +346,10 @@ class TopicElement(Element):
         #: Whether the data shown is from a publisher or connection that is gone.
         self._outdated = False
         self._publishers = 0
+        #: GIDs of the present publishers, or of the last ones; empty where the graph has none.
+        self._gids: set[bytes] = set()
+        #: GID of the publisher of the data shown, if the graph lost it before the data arrived.
+        self._lost_gid = b""
         #: Names the publishers of the topic that cannot be distinguished; empty for none.
         self._mixing = ""
         self._no_publisher = single_shot(self, self._log_no_publisher)
@@ -419,9 +423,17 @@ class TopicElement(Element):
         if node is None or not self._resolved:
             return 0
         try:
-            return len(node.publishers(self._resolved))
+            publishers = node.publishers(self._resolved)
         except Error:
             return 0
+        self._gids = {one.gid for one in publishers if one.gid} or self._gids
+        return len(publishers)
+
+    def _judge_publisher(self, gid: bytes) -> None:
+        """Set whether data that has just arrived is out of date: the graph may overtake it."""
+        is_lost = not self._publishers and gid in self._gids
+        self._lost_gid = gid if is_lost else b""
+        self._outdated = is_lost
 
     def _update(self) -> None:
         before, self._shown_namespace = self._shown_namespace, self._get_namespace()
@@ -446,6 +458,8 @@ class TopicElement(Element):
         if before and not self._publishers:
             # The robot is disconnected: the data on the screen is out of date, however recent.
             self._outdated = True
+        elif self._publishers and self._lost_gid and self._lost_gid in self._gids:
+            self._judge_publisher(self._lost_gid)
         else:
             self._recheck_outdated()
         self._update_stale()

@@ -304,9 +304,9 @@ class Subscription(TopicElement):
         self._shown_at = self._steady() - held
         self._late = self._lateness(sample)
         self._age = held
-        self._outdated = False
+        self._judge_publisher(sample.publisher)
         # Update all properties before emitting the first signal.
-        was_stale, self._stale = self._stale, self._is_old()
+        was_stale, self._stale = self._stale, self._outdated or self._is_old()
         if new_type:
             self.messageTypeChanged.emit()
         self.messageChanged.emit()

@@ -206,6 +206,8 @@ class InteractiveMarkersDisplay(TopicDisplay):
         #: The control whose menu is open, and where it was clicked.
         self._asked: tuple[Control, Any] | None = None
         self._ready: Any = None
+        #: True while the service exists.
+        self._is_served = False
         #: The view that the scene belongs to, and that in which the mouse has used a marker.
         self._view: Any = None
         self.used_view: Any = None
@@ -311,6 +313,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
         if endpoint.client is None:
             self._request()
             return
+        self._is_served = False
         ready = weak_callback(self._on_service)
         self._ready = endpoint.client.on_ready_change(ready, self._executor)
         self._on_service(endpoint.client.ready)
@@ -326,9 +329,11 @@ class InteractiveMarkersDisplay(TopicDisplay):
         """Request the markers of a server that has appeared."""
         if not is_alive(self) or self._endpoint is None:
             return
-        if ready:
+        # What a listener added just before the first check reports is known by then.
+        is_new, self._is_served = ready and not self._is_served, ready
+        if is_new:
             self._request_all()
-        elif not self._servers:
+        elif not ready and not self._servers:
             self.set_status("Server", "warn", f"no server in {self.namespace}")
 
     def _request_all(self) -> None:

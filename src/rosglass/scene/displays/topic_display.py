@@ -482,7 +482,7 @@ class TopicDisplay(OneTopicDisplay):
         self._intervals.append(now - self._arrived_at)
         self._arrived, self._arrived_at, self._message_late = time.time(), now, queue.late
         self._newest = items[-1]
-        self._outdated = False
+        self._judge_publisher(queue.publisher)
         self._waiting.extend(items)
         self._show_waiting()
         self._drop_oldest(queue)
