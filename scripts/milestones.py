@@ -153,6 +153,21 @@ def back_arrows(graph: dict[str, set[str]]) -> int:
     return sum(one < other and (other, one) in arrows for one, other in arrows)
 
 
+def inheritance(sources: list[Source], base: str) -> list[str]:
+    """Return the longest line of classes that derive from each other, from `base` down."""
+    children: dict[str, list[str]] = {}
+    for source in sources:
+        for node in ast.walk(source.tree):
+            if isinstance(node, ast.ClassDef):
+                for parent in node.bases:
+                    children.setdefault(ast.unparse(parent), []).append(node.name)
+
+    def below(name: str) -> list[str]:
+        return [name, *max(map(below, children.get(name, [])), key=len, default=[])]
+
+    return below(base)
+
+
 def loaded(root: Path, module: str, package: str) -> int:
     """Count modules of a package that importing a module loads, in a process of its own."""
     code = (
@@ -369,6 +384,11 @@ def main() -> None:
         ),
         ("files directly in scene/, qml/", f"{flat('scene')}, {flat('qml')}", "4, 4"),
         (f"largest file of scene/ ({largest.path.name}), lines", largest.lines, "900"),
+        (
+            "classes from Display to the deepest display of scene/",
+            len(inheritance(inside_of("scene"), "Display")),
+            "4",
+        ),
         ("packages that import each other, pairs", back_arrows(graph), "0"),
         ("modules that import each other, pairs", circles(graph), "2"),
         ("import cycles of more than two modules", f"{groups} ({inside} modules)", "0"),

@@ -163,9 +163,9 @@ def test_fewer_poses_are_shown_at_once_and_the_most_is_said(
 def test_the_most_messages_of_a_history_is_said(
     show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.scene.displays import geometry
+    from rosglass.scene.displays import topic_display
 
-    monkeypatch.setattr(geometry, "_MAX_HISTORY", 4)
+    monkeypatch.setattr(topic_display, "_MAX_HISTORY", 4)
     messages = [{"point": {"x": float(x)}} for x in range(6)]
     display = show("PointStamped", "geometry_msgs/PointStamped", *messages, historyLength=5)
     assert len(parts(display, SPHERE)) == 4

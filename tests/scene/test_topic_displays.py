@@ -95,11 +95,10 @@ def test_the_status_says_why_nothing_was_received(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     from rosglass.qml.elements import element
-    from rosglass.scene.displays.topic_display import OneTopicDisplay
 
     monkeypatch.setattr(element, "NO_PEER_MS", 50)
     scene = bench.load("ImagePanels { view: parent }").scene
-    kinds = [name for name, kind in scene.TYPES.items() if issubclass(kind, OneTopicDisplay)]
+    kinds = [name for name, kind in scene.TYPES.items() if kind.TOPIC_KEYS]
     assert len(kinds) > 20
     for name in kinds:
         scene.add(name, topic="/skan")

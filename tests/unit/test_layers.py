@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -104,13 +104,23 @@ def test_a_package_with_rooms_has_few_modules_outside_them(package: str) -> None
     assert len(list((ROOT / package).glob("*.py"))) <= 4
 
 
-def test_modules_import_each_other_in_pairs_at_most() -> None:
+@pytest.fixture(scope="module")
+def milestones() -> Any:
     place = Path(__file__).parents[2] / "scripts" / "milestones.py"
     spec = importlib.util.spec_from_file_location("milestones", place)
     assert spec is not None
     assert spec.loader is not None
-    milestones = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(milestones)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_displays_are_derived_from_four_classes_at_most(milestones: Any) -> None:
+    line = milestones.inheritance(milestones.read(ROOT / "scene"), "Display")
+    assert len(line) <= 4, " <- ".join(line)
+
+
+def test_modules_import_each_other_in_pairs_at_most(milestones: Any) -> None:
     # Imports for type checkers only and those in functions are counted, too.
     assert milestones.cycles(milestones.import_graph(ROOT, milestones.read(ROOT))) == (0, 0)
 

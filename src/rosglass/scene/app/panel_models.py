@@ -15,7 +15,6 @@ from rosglass.interfaces.names import ros1_name
 from rosglass.qml.engine.properties import Writable
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import FIXED_FRAME
-from rosglass.scene.displays.topic_display import OneTopicDisplay
 from rosglass.scene.view.display_configs import GroupDisplay, UnknownDisplay, duplicate_display
 from rosglass.scene.view.scene_view import SceneView
 
@@ -392,7 +391,7 @@ class DisplaysModel(QAbstractListModel):
             return tuple(setting.kind.options["choices"])
         if setting.kind.NAME == "frame" and display.scene is not None:
             return (FIXED_FRAME, *display.scene.frames())
-        if setting.kind.NAME == "topic" and isinstance(display, OneTopicDisplay):
+        if setting.kind.NAME == "topic":
             wanted = display.suggested(setting.path)
             return tuple(name for name, kinds in self._topics() if set(kinds) & set(wanted))
         return ()

@@ -11,23 +11,25 @@ from __future__ import annotations
 import logging
 import math
 import time
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from rosglass.comm.names import similar
-from rosglass.errors import ArgumentError, TransformException
+from rosglass.errors import ArgumentError, Error, TransformException
+from rosglass.interfaces.names import ros1_name
 from rosglass.qml.elements.element import TopicElement, single_shot
 from rosglass.qml.engine.log import log_from_qml
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
 from rosglass.qt import QtQml, Signal, Slot, is_alive
-from rosglass.scene.configs.rviz_formats import FIXED_FRAME
+from rosglass.scene.configs.rviz_formats import FIXED_FRAME, TopicSetting, read_topic, write_topic
 from rosglass.scene.configs.settings import Configurable, Setting
 from rosglass.scene.displays.declared import expect_view, find_view
 from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -78,11 +80,18 @@ class Display(Configurable, TopicElement):
 
     Attributes:
         TYPE: Its name in RViz, e.g. ``Grid``.
+        MESSAGES: Names of the message types that it shows, without ``msg/``.
+        SUGGESTED: Those of topics that panels suggest for it, if these are fewer.
+        TOPIC_KEYS: Entries of a file that name its topic; empty for a display without the settings
+            `topic` and `depth`.
         root: What it draws, in the fixed frame.
     """
 
     TYPE: ClassVar[str] = ""
     SETTINGS: ClassVar[dict[str, Setting]] = {}
+    MESSAGES: ClassVar[tuple[str, ...]] = ()
+    SUGGESTED: ClassVar[tuple[str, ...]] = ()
+    TOPIC_KEYS: ClassVar[tuple[str, ...]] = ()
 
     nameChanged = Signal()
     statusChanged = Signal()
@@ -94,6 +103,14 @@ class Display(Configurable, TopicElement):
     statusLevel = ReadOnly(str, "ok", notify="statusChanged")
     #: All lines, each with its name.
     statusText = ReadOnly(str, "", notify="statusChanged")
+
+    if TYPE_CHECKING:
+        topic: Any
+        depth: Any
+    #: Whether the topic has had the time to be found.
+    _is_searched = False
+    #: The depth of a file, and the one that is used for it: RViz has no limit, and 0 for any.
+    _depth_of_file: tuple[int | None, int | None] = (None, None)
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -339,6 +356,141 @@ class Display(Configurable, TopicElement):
         if len(new) > _MAX_LOGGED:
             more = f"{len(new) - _MAX_LOGGED} more errors, see its statusText"
             self._log(f"{self.label}: {more}", logging.WARNING)
+
+    # -- files -----------------------------------------------------------------------------------
+
+    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
+        """Take the settings of a file of either RViz, which write topics differently."""
+        keys = self.TOPIC_KEYS
+        refused = super().load_settings({k: v for k, v in saved.items() if k not in keys})
+        if keys:
+            try:
+                refused += self._load_topic(saved)
+            except Error as error:
+                refused.append(str(error))
+        return refused
+
+    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
+        """Return the settings for a file of one RViz."""
+        keys, before = self.TOPIC_KEYS, older or {}
+        topic = {key: before[key] for key in keys if before.get(key) is not None}
+        kept = super().save_settings({k: v for k, v in before.items() if k not in keys}, ros)
+        if keys:
+            for key in keys:
+                kept.pop(key, None)
+            self._save_topic(kept, topic, ros)
+        return kept
+
+    def _load_topic(self, saved: Mapping[str, Any]) -> list[str]:
+        """Take the topic of a file, with its settings; return what does not fit.
+
+        Raises:
+            Error: The file does not say which topic.
+        """
+        given = read_topic(saved)
+        self.set("Topic", given.name)
+        if given.depth:
+            limits = self.SETTINGS["Topic/Depth"].kind.options
+            self.depth = min(max(given.depth, limits["min"]), limits["max"])
+        self._depth_of_file = (given.depth, self.depth)
+        if given.depth and given.depth != self.depth:
+            text = f"Depth: {given.depth} is out of range; {self.depth} is used"
+            return [f"{text}, and the file keeps it"]
+        return []
+
+    def _save_topic(self, kept: dict[str, Any], before: Mapping[str, Any], ros: int) -> None:
+        """Write the topic for a file of one RViz, beside what the file had."""
+        kept.update(before)
+        write_topic(kept, self._saved_topic(), ros)
+
+    def _saved_topic(self) -> TopicSetting:
+        given, used = self._depth_of_file
+        depth = self.depth if given is None or self.depth != used else given
+        return TopicSetting(self.topic, depth)
+
+    # -- the topic, of displays that have one ----------------------------------------------------
+
+    def suggested(self, path: str) -> tuple[str, ...]:  # noqa: ARG002 - for subclasses
+        """Return the types of the topics that panels suggest for a setting."""
+        return self.SUGGESTED or self.MESSAGES
+
+    def _find_topic(self) -> str:
+        """Return the absolute name of the topic; empty, with a status, while there is none."""
+        if self.node is None or not self.shown or self.scene is None:
+            return ""
+        if not self._topic:
+            self.set_status("Topic", "warn", "no topic is chosen")
+            return ""
+        self._resolved = self._resolve(self._topic)
+        if not self._resolved:
+            self.set_status("Topic", "error", self._problem)
+        return self._resolved
+
+    def _begin_to_wait(self) -> None:
+        """Say that nothing was received, and after a while that there is no publisher."""
+        self._is_searched = False
+        self.delete_status("Topic")
+        self._report_waiting()
+        self._expect_publishers()
+
+    def _is_waiting(self) -> bool:
+        """Return whether nothing was received yet."""
+        line = self.status_lines.get("Topic")
+        is_open = bool(self.TOPIC_KEYS) and self._endpoint is not None
+        return is_open and (line is None or line.level != "ok")
+
+    def _report_waiting(self) -> None:
+        """Say in the status what is received, as long as that is nothing, and why."""
+        if self._is_waiting():
+            level, text = self._find_reason()
+            if level == "error" and Status(level, text) != self.status_lines.get("Topic"):
+                # For interfaces that show no status.
+                self._log(f"{self._topic_in_logs()}: {text}", logging.WARNING)
+            self.set_status("Topic", level, text)
+
+    def _find_reason(self) -> tuple[str, str]:
+        """Return why nothing was received: level and text."""
+        node, session, topic = self.node, self._session, self._resolved
+        text = f"No messages received on {topic}"
+        if node is None or session is None or session.state != "connected":
+            return "warn", text
+        # The node may just have been closed.
+        with suppress(Error):
+            topics = node.topics()
+            types = topics.get(topic, ())
+            if types and self.MESSAGES and not set(map(ros1_name, types)) & set(self.MESSAGES):
+                wanted = " or ".join(self.MESSAGES)
+                return "error", f"the topic's type is {', '.join(types)}, not {wanted}"
+            if self._is_searched and not self._count_publishers():
+                text = f"{text}: it has no publisher{similar(topic, topics)}"
+            elif problem := getattr(self._endpoint, "problem", ""):
+                text = f"{text}: {problem}"
+            elif self._count_publishers() and (hint := getattr(self._endpoint, "hint", "")):
+                text = f"{text}: {hint}"
+        return "warn", text
+
+    def _topic_in_logs(self) -> str:
+        return f"{self.label}: {self._resolved}"
+
+    @Slot()
+    def _log_no_publisher(self) -> None:
+        super()._log_no_publisher()
+        self._is_searched = True
+        self._report_waiting()
+
+    @Slot()
+    def _on_graph(self) -> None:
+        super()._on_graph()
+        self._report_waiting()
+
+    def _on_topic(self) -> None:
+        self._topic = self.topic
+        self._set_problem("")
+        self._resolved = ""
+        self._close_endpoint()  # not later: messages of it may be on their way
+        self.clear_status()
+        self.reset()
+        self._schedule()
 
     # -- frames ----------------------------------------------------------------------------------
 

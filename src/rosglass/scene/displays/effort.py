@@ -18,9 +18,9 @@ from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.configs.settings import Setting
 from rosglass.scene.data.urdf import parse_urdf
 from rosglass.scene.displays.display import Status
-from rosglass.scene.displays.geometry import HistoryDisplay
 from rosglass.scene.displays.parts import Parts
 from rosglass.scene.displays.robot_model import DescriptionLoader, DescriptionSource
+from rosglass.scene.displays.topic_display import HistoryDisplay
 from rosglass.scene.render.drawing import Lines, Mesh
 from rosglass.scene.render.matrices import rotation_of_z_to
 from rosglass.scene.render.mesh_shapes import CONE

@@ -4,33 +4,29 @@
 from __future__ import annotations
 
 import math
-from collections import deque
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rosglass.errors import Error
 from rosglass.scene.configs.settings import Setting, rgb_of
-from rosglass.scene.displays.message_queue import MOST_WAITING
 from rosglass.scene.displays.shapes import ArrowShapes, read_columns
-from rosglass.scene.displays.topic_display import TopicDisplay
+from rosglass.scene.displays.topic_display import HistoryDisplay
 from rosglass.scene.render.arrays import check_numbers
 from rosglass.scene.render.drawing import Lines, Mesh
 from rosglass.scene.render.matrices import instance_matrix, pose_along, rotation_of_z_to
 from rosglass.scene.render.mesh_shapes import CONE, SPHERE
-from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from rosglass.qml.engine.runtime import Runtime
-    from rosglass.qt import QtCore
+    from rosglass.scene.render.scene_tree import Group
+
 
 __all__ = [
     "AccelStampedDisplay",
-    "HistoryDisplay",
     "PointStampedDisplay",
     "PolygonDisplay",
     "RangeDisplay",
@@ -39,84 +35,6 @@ __all__ = [
 ]
 
 _MAX_CORNERS = 100_000
-#: Messages that one display shows.
-_MAX_HISTORY = 10_000
-
-
-class _Kept(NamedTuple):
-    """A message that is shown.
-
-    Attributes:
-        data: What was read from it.
-        pose: Of its frame in the fixed frame.
-        group: What it draws.
-    """
-
-    data: Any
-    pose: NDArray[np.float64]
-    group: Group
-
-
-class HistoryDisplay(TopicDisplay):
-    """A display of the last messages, each drawn on its own.
-
-    Attributes:
-        LENGTH: The setting of how many are shown; empty for the newest one alone.
-    """
-
-    LENGTH: ClassVar[str] = ""
-
-    def __init__(
-        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
-    ) -> None:
-        self._kept: deque[_Kept] = deque()
-        super().__init__(parent, runtime)
-
-    def length(self) -> int:
-        """Return how many messages are shown."""
-        return int(self.get(self.LENGTH)) if self.LENGTH else 1
-
-    def shows_all(self) -> bool:
-        """Return whether earlier messages are shown as well."""
-        return self.length() > 1
-
-    def most_waiting(self) -> int:
-        """Return how many messages may wait: no more than are shown."""
-        return max(int(self.depth), min(self.length(), MOST_WAITING))
-
-    def draw(self, data: Any, group: Group) -> None:
-        """Fill a group with what a message shows, in its frame."""
-        raise NotImplementedError
-
-    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
-        """Show a message beside earlier ones."""
-        group = Group()
-        group.pose = pose
-        self._kept.append(_Kept(data, pose, group))
-        self.root.add(group)
-        self.draw(data, group)
-        self._drop_old()
-
-    def _drop_old(self) -> None:
-        length = self.length()
-        while len(self._kept) > min(length, _MAX_HISTORY):
-            self._kept.popleft().group.remove()
-        if len(self._kept) == _MAX_HISTORY < length:
-            self.set_status(self.LENGTH, "warn", f"only the latest {_MAX_HISTORY} are shown")
-        else:
-            self.delete_status(self.LENGTH)
-
-    def _restyle(self) -> None:
-        self._drop_old()
-        for kept in self._kept:
-            kept.group.clear()
-            self.draw(kept.data, kept.group)
-
-    def reset(self) -> None:
-        """Drop all messages."""
-        super().reset()
-        self._kept.clear()
-        self._drop_old()
 
 
 def _vector(name: str, vector: Any) -> tuple[float, float, float]:
@@ -231,53 +149,55 @@ def _read_range(message: Any) -> tuple[float, float]:
     return (value if inside else 0.0), abs(angle)
 
 
-class _Screw(HistoryDisplay):
-    """A display of a linear and an angular vector, as arrows."""
+def _screw_settings() -> tuple[Setting, Setting, Setting, Setting]:
+    """Return the settings of a linear and an angular vector that are shown as arrows.
 
-    IS_CONTINUOUS = True
-    LENGTH = "History Length"
-    #: Their names in the message, and the field that holds both.
-    _FIELDS = ("linear", "angular")
-    _HOLDER = ""
+    They are opacity, width of arrows, length of the history, and whether small values are hidden.
+    """
+    return (
+        Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0),
+        Setting("Arrow Width", "float", 0.5, "In metres.", min=0.0),
+        Setting(
+            "History Length", "int", 1, "How many are shown.", min=1, max=100_000, then="_on_length"
+        ),
+        Setting(
+            "Hide Small Values", "bool", True,
+            "Whether arrows shorter than their width are hidden.",
+        ),
+    )  # fmt: skip
 
-    alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
-    arrowWidth = Setting("Arrow Width", "float", 0.5, "In metres.", min=0.0)
-    historyLength = Setting(
-        "History Length", "int", 1, "How many are shown.", min=1, max=100_000, then="_on_length"
-    )
-    hideSmallValues = Setting(
-        "Hide Small Values", "bool", True, "Whether arrows shorter than their width are hidden."
-    )
 
-    def preparer(self) -> Callable[[Any], Any]:
-        """Return the function that reads both vectors."""
-        holder, fields = self._HOLDER, self._FIELDS
+def _screw_reader(holder: str, *fields: str) -> Callable[[Any], Any]:
+    """Return the function that reads two vectors, each a field of `holder`."""
 
-        def read(message: Any) -> Any:
-            both = getattr(message, holder)
-            return [np.array(_vector(f"{holder}.{name}", getattr(both, name))) for name in fields]
+    def read(message: Any) -> Any:
+        both = getattr(message, holder)
+        return [np.array(_vector(f"{holder}.{name}", getattr(both, name))) for name in fields]
 
-        return read
+    return read
 
-    def look(self) -> tuple[tuple[Any, float], tuple[Any, float]]:
-        """Return colour and scale of both arrows."""
-        raise NotImplementedError
 
-    def draw(self, data: Any, group: Group) -> None:
-        """Draw two arrows, and a circle around the second."""
-        for number, ((color, scale), vector) in enumerate(zip(self.look(), data, strict=True)):
-            length = float(np.linalg.norm(vector)) * scale
-            wide = self.arrowWidth
-            if length <= 0 or (self.hideSmallValues and length < wide):
-                continue
-            rgba = (*rgb_of(color), self.alpha)
-            pose = pose_along(vector / np.linalg.norm(vector))
-            arrow = ArrowShapes(self)
-            # Proportions of RViz's arrow.
-            arrow.set_arrows(pose, (length, 0.1 * wide), (0.3 * length, 0.2 * wide), rgba)
-            group.add(arrow)
-            if number:
-                group.add(*_circle(pose[:3, 0], length, wide, rgba))
+def _draw_screw(display: Any, group: Group, *vectors: tuple[NDArray[Any], Any, float]) -> None:
+    """Draw two arrows, and a circle around the second.
+
+    Args:
+        display: The display, with the settings of :func:`_screw_settings`.
+        group: Where they are drawn.
+        vectors: Both vectors, each with its colour and its scale.
+    """
+    for number, (vector, color, scale) in enumerate(vectors):
+        length = float(np.linalg.norm(vector)) * scale
+        wide = display.arrowWidth
+        if length <= 0 or (display.hideSmallValues and length < wide):
+            continue
+        rgba = (*rgb_of(color), display.alpha)
+        pose = pose_along(vector / np.linalg.norm(vector))
+        arrow = ArrowShapes(display)
+        # Proportions of RViz's arrow.
+        arrow.set_arrows(pose, (length, 0.1 * wide), (0.3 * length, 0.2 * wide), rgba)
+        group.add(arrow)
+        if number:
+            group.add(*_circle(pose[:3, 0], length, wide, rgba))
 
 
 def _circle(
@@ -305,48 +225,76 @@ def _circle(
     return lines, head
 
 
-class WrenchStampedDisplay(_Screw):
+class WrenchStampedDisplay(HistoryDisplay):
     """A ``geometry_msgs/WrenchStamped``: force and torque. See its page in ``docs/scene.md``."""
 
     TYPE = "WrenchStamped"
+    IS_CONTINUOUS = True
+    LENGTH = "History Length"
     MESSAGES = ("geometry_msgs/WrenchStamped",)
-    _FIELDS, _HOLDER = ("force", "torque"), "wrench"
 
+    alpha, arrowWidth, historyLength, hideSmallValues = _screw_settings()
     forceColor = Setting("Force Color", "color", "#cc3333", "Of the force.")
     torqueColor = Setting("Torque Color", "color", "#cccc33", "Of the torque.")
     forceArrowScale = Setting("Force Arrow Scale", "float", 2.0, "Metres per newton.")
     torqueArrowScale = Setting("Torque Arrow Scale", "float", 2.0, "Metres per newton metre.")
 
-    def look(self) -> tuple[tuple[Any, float], tuple[Any, float]]:
-        """Return colour and scale of both arrows."""
-        return (self.forceColor, self.forceArrowScale), (self.torqueColor, self.torqueArrowScale)
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads both vectors."""
+        return _screw_reader("wrench", "force", "torque")
+
+    def draw(self, data: Any, group: Group) -> None:
+        """Draw both vectors."""
+        force = (data[0], self.forceColor, self.forceArrowScale)
+        torque = (data[1], self.torqueColor, self.torqueArrowScale)
+        _draw_screw(self, group, force, torque)
 
 
-class _Motion(_Screw):
+class TwistStampedDisplay(HistoryDisplay):
+    """A ``geometry_msgs/TwistStamped``: velocities. See its page in ``docs/scene.md``."""
+
+    TYPE = "TwistStamped"
+    IS_CONTINUOUS = True
+    LENGTH = "History Length"
+    MESSAGES = ("geometry_msgs/TwistStamped",)
+
+    alpha, arrowWidth, historyLength, hideSmallValues = _screw_settings()
     linearColor = Setting("Linear Color", "color", "#cc3333", "Of the linear part.")
     angularColor = Setting("Angular Color", "color", "#cccc33", "Of the angular part.")
     linearArrowScale = Setting("Linear Arrow Scale", "float", 2.0, "Metres per unit.")
     angularArrowScale = Setting("Angular Arrow Scale", "float", 2.0, "Metres per unit.")
 
-    def look(self) -> tuple[tuple[Any, float], tuple[Any, float]]:
-        """Return colour and scale of both arrows."""
-        return (
-            (self.linearColor, self.linearArrowScale),
-            (self.angularColor, self.angularArrowScale),
-        )
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads both vectors."""
+        return _screw_reader("twist", "linear", "angular")
+
+    def draw(self, data: Any, group: Group) -> None:
+        """Draw both vectors."""
+        linear = (data[0], self.linearColor, self.linearArrowScale)
+        angular = (data[1], self.angularColor, self.angularArrowScale)
+        _draw_screw(self, group, linear, angular)
 
 
-class TwistStampedDisplay(_Motion):
-    """A ``geometry_msgs/TwistStamped``: velocities. See its page in ``docs/scene.md``."""
-
-    TYPE = "TwistStamped"
-    MESSAGES = ("geometry_msgs/TwistStamped",)
-    _HOLDER = "twist"
-
-
-class AccelStampedDisplay(_Motion):
+class AccelStampedDisplay(HistoryDisplay):
     """A ``geometry_msgs/AccelStamped``: accelerations. See its page in ``docs/scene.md``."""
 
     TYPE = "AccelStamped"
+    IS_CONTINUOUS = True
+    LENGTH = "History Length"
     MESSAGES = ("geometry_msgs/AccelStamped",)
-    _HOLDER = "accel"
+
+    alpha, arrowWidth, historyLength, hideSmallValues = _screw_settings()
+    linearColor = Setting("Linear Color", "color", "#cc3333", "Of the linear part.")
+    angularColor = Setting("Angular Color", "color", "#cccc33", "Of the angular part.")
+    linearArrowScale = Setting("Linear Arrow Scale", "float", 2.0, "Metres per unit.")
+    angularArrowScale = Setting("Angular Arrow Scale", "float", 2.0, "Metres per unit.")
+
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads both vectors."""
+        return _screw_reader("accel", "linear", "angular")
+
+    def draw(self, data: Any, group: Group) -> None:
+        """Draw both vectors."""
+        linear = (data[0], self.linearColor, self.linearArrowScale)
+        angular = (data[1], self.angularColor, self.angularArrowScale)
+        _draw_screw(self, group, linear, angular)

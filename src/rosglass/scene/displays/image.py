@@ -31,9 +31,9 @@ from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import Property, QtCore, QtGui, QtQml, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import read_number
 from rosglass.scene.configs.settings import Setting
+from rosglass.scene.displays.display import Display
 from rosglass.scene.displays.message_queue import MessageQueue, Subscriptions, drop_oldest
 from rosglass.scene.displays.parts import Parts
-from rosglass.scene.displays.topic_display import OneTopicDisplay
 from rosglass.scene.render.camera import PinholeCamera
 from rosglass.scene.view.scene_view import SceneView
 
@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     from rosglass.qml.elements.image_stream import SharedStream
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.qml.engine.session import Session
-    from rosglass.scene.displays.display import Display
     from rosglass.scene.displays.scene import Scene
     from rosglass.scene.render.camera import Camera
     from rosglass.scene.render.renderer import Frame
@@ -78,7 +77,7 @@ _PANEL, _SIDES = "Panel Geometry", ("X", "Y", "Width", "Height")
 _NO_PANEL = "no panel shows it: declare ImagePanel { display: ... }"
 
 
-class PictureDisplay(OneTopicDisplay):
+class PictureDisplay(Display):
     """Base class of the displays of a camera's pictures, which several panels may show.
 
     It receives pictures while a panel shows it.
@@ -89,6 +88,8 @@ class PictureDisplay(OneTopicDisplay):
     #: Another picture is shown, at another place, or none any more.
     pictureChanged = Signal()
 
+    TOPIC_KEYS = ("Topic",)
+    topic = Setting("Topic", "topic", "", "Topic to subscribe to.", then="_on_topic")
     depth = Setting(
         "Topic/Depth", "int", 2, "Pictures kept until their transform is known.", min=1, max=100,
         then="",
@@ -99,6 +100,8 @@ class PictureDisplay(OneTopicDisplay):
         choices=list(TRANSPORTS), then="_schedule",
     )  # fmt: skip
 
+    #: How many pictures were received.
+    received = ReadOnly(int, 0)
     #: Place and size of its panel in a view, units of the view; empty until the user moves it.
     panelGeometry = Writable(QtCore.QRectF, QtCore.QRectF(), then="")
     #: Whether it, and the groups that it is in, are enabled.
@@ -188,6 +191,9 @@ class PictureDisplay(OneTopicDisplay):
     def on_group_enabled(self) -> None:
         """Show or hide the panels, as it or its group is shown or hidden."""
         super().on_group_enabled()
+        if not self.shown:
+            self._close_endpoint()
+            self.reset()
         if self.scene is not None:
             report(self, active=self.shown)
 

@@ -35,7 +35,7 @@ from rosglass.scene.displays.interactive_marker_messages import (
 )
 from rosglass.scene.displays.marker_meshes import MarkerMeshes
 from rosglass.scene.displays.message_queue import MessageQueue, drop_oldest
-from rosglass.scene.displays.topic_display import OneTopicDisplay, TopicDisplay
+from rosglass.scene.displays.topic_display import TopicDisplay
 from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:
@@ -170,6 +170,8 @@ class InteractiveMarkersDisplay(TopicDisplay):
 
     TYPE = "InteractiveMarkers"
     MESSAGES = ("visualization_msgs/InteractiveMarkerUpdate",)
+    #: Both RViz name the server differently.
+    TOPIC_KEYS = ("Interactive Markers Namespace", "Update Topic")
     KEEPS_ALL: ClassVar[bool] = True
     EAGER: ClassVar[bool] = True
     SETTINGS: ClassVar[dict[str, Setting]] = {}
@@ -733,23 +735,9 @@ class InteractiveMarkersDisplay(TopicDisplay):
 
     # -- files -----------------------------------------------------------------------------------
 
-    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file of either RViz, which name the server differently."""
-        keys = ("Interactive Markers Namespace", "Update Topic")
-        refused = super(OneTopicDisplay, self).load_settings(
-            {key: value for key, value in saved.items() if key not in keys}
-        )
-        try:
-            self.set("Interactive Markers Namespace", read_marker_namespace(saved))
-        except Error as error:
-            refused.append(str(error))
-        return refused
+    def _load_topic(self, saved: Mapping[str, Any]) -> list[str]:
+        self.set("Interactive Markers Namespace", read_marker_namespace(saved))
+        return []
 
-    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
-        """Return the settings for a file of one RViz."""
-        key = "Interactive Markers Namespace"
-        kept = super(OneTopicDisplay, self).save_settings(older, ros)
-        kept.pop(key, None)
-        kept.pop("Update Topic", None)
+    def _save_topic(self, kept: dict[str, Any], before: Mapping[str, Any], ros: int) -> None:  # noqa: ARG002
         write_marker_namespace(kept, self.namespace, ros)
-        return kept

@@ -10,12 +10,11 @@ import numpy as np
 
 from rosglass.errors import Error
 from rosglass.scene.configs.settings import Setting, rgb_of
-from rosglass.scene.displays.geometry import HistoryDisplay
 from rosglass.scene.displays.shapes import ALONG, ArrowShapes, AxesShapes, read_columns
-from rosglass.scene.displays.topic_display import TopicDisplay
+from rosglass.scene.displays.topic_display import HistoryDisplay, TopicDisplay
 from rosglass.scene.render.arrays import check_numbers
 from rosglass.scene.render.drawing import Lines, Mesh
-from rosglass.scene.render.matrices import matrix_of, poses_matrices
+from rosglass.scene.render.matrices import matrix_of, poses_matrices, stack_poses
 from rosglass.scene.render.mesh_shapes import CONE, CYLINDER, SPHERE
 from rosglass.scene.render.scene_tree import Group
 
@@ -61,25 +60,70 @@ def _metres(path: str, default: float, shown_if: Mapping[str, Any]) -> Setting:
     return Setting(path, "float", default, "In metres.", min=0.0, shown_if=shown_if)
 
 
-class _Shaped(TopicDisplay):
-    """A display of poses as arrows or axes."""
+def _shape_settings() -> tuple[Setting, ...]:
+    """Return the settings of a pose that is shown as an arrow or as axes."""
+    return (
+        Setting("Shape", "enum", "Arrow", "How a pose is drawn.", choices=["Arrow", "Axes"]),
+        Setting("Color", "color", "#ff1900", "Of arrows.", shown_if=_ARROW),
+        Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0),
+        _metres("Shaft Length", 1.0, _ARROW),
+        _metres("Shaft Radius", 0.05, _ARROW),
+        _metres("Head Length", 0.3, _ARROW),
+        _metres("Head Radius", 0.1, _ARROW),
+        _metres("Axes Length", 1.0, _AXES),
+        _metres("Axes Radius", 0.1, _AXES),
+    )
 
-    shape = Setting("Shape", "enum", "Arrow", "How a pose is drawn.", choices=["Arrow", "Axes"])
-    color = Setting("Color", "color", "#ff1900", "Of arrows.", shown_if=_ARROW)
-    alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
-    shaftLength = _metres("Shaft Length", 1.0, _ARROW)
-    shaftRadius = _metres("Shaft Radius", 0.05, _ARROW)
-    headLength = _metres("Head Length", 0.3, _ARROW)
-    headRadius = _metres("Head Radius", 0.1, _ARROW)
-    axesLength = _metres("Axes Length", 1.0, _AXES)
-    axesRadius = _metres("Axes Radius", 0.1, _AXES)
+
+class _PoseShapes(Group):
+    """Poses as arrows or axes.
+
+    Args:
+        display: The display, whose settings say how.
+        arrow: The value of its setting `shape` for arrows; for axes, it is ``Axes``.
+    """
+
+    def __init__(self, display: Any, arrow: str = "Arrow") -> None:
+        self._display, self._arrow = display, arrow
+        self._arrows, self._axes = ArrowShapes(display), AxesShapes(display)
+        super().__init__(self._arrows, self._axes)
+
+    def draw(self, poses: NDArray[np.float64]) -> None:
+        """Draw poses, (n, 4, 4), instead of those before."""
+        display, none = self._display, poses[:0]
+        self._arrows.set_arrows(
+            poses if display.shape == self._arrow else none,
+            # RViz takes what it calls radius for the diameter.
+            (display.shaftLength, display.shaftRadius),
+            (display.headLength, display.headRadius),
+            (*rgb_of(display.color), display.alpha),
+        )
+        self._axes.set_axes(
+            poses if display.shape == "Axes" else none,
+            display.axesLength,
+            display.axesRadius,
+            display.alpha,
+        )
+
+
+def _read_pose(message: Any) -> NDArray[np.float64]:
+    return matrix_of(message.pose)
+
+
+class PoseDisplay(TopicDisplay):
+    """A ``geometry_msgs/PoseStamped``. See its page in ``docs/scene.md``."""
+
+    TYPE = "Pose"
+    MESSAGES = ("geometry_msgs/PoseStamped",)
+
+    shape, color, alpha, *_lengths = _shape_settings()
+    shaftLength, shaftRadius, headLength, headRadius, axesLength, axesRadius = _lengths
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
-        self._arrows, self._axes = ArrowShapes(self), AxesShapes(self)
-        #: In the fixed frame, the oldest first.
-        self._poses: list[NDArray[np.float64]] = []
+        self._shapes = _PoseShapes(self)
+        self._poses: NDArray[np.float64] = np.zeros((0, 4, 4))
         super().__init__(parent, runtime)
 
     def preparer(self) -> Callable[[Any], Any]:
@@ -88,52 +132,17 @@ class _Shaped(TopicDisplay):
 
     def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
         """Show a pose."""
-        self._poses = [pose @ data]
-        self._draw()
-
-    def _draw(self) -> None:
-        self.root.add(self._arrows, self._axes)
+        self._poses = stack_poses(pose @ data)
+        self.root.add(self._shapes)
         self._restyle()
 
     def _restyle(self) -> None:
-        poses = np.array(self._poses).reshape(-1, 4, 4)
-        _set_shapes(self, self._arrows, self._axes, poses, "Arrow")
+        self._shapes.draw(self._poses)
 
     def reset(self) -> None:
-        """Drop all poses."""
+        """Drop the pose."""
         super().reset()
-        self._poses = []
-
-
-def _set_shapes(
-    display: Any, arrows: ArrowShapes, axes: AxesShapes, poses: NDArray[np.float64], arrow: str
-) -> None:
-    """Draw poses as arrows if the display's shape is `arrow`, as axes if it is ``Axes``."""
-    none = poses[:0]
-    arrows.set_arrows(
-        poses if display.shape == arrow else none,
-        # RViz takes what it calls radius for the diameter.
-        (display.shaftLength, display.shaftRadius),
-        (display.headLength, display.headRadius),
-        (*rgb_of(display.color), display.alpha),
-    )
-    axes.set_axes(
-        poses if display.shape == "Axes" else none,
-        display.axesLength,
-        display.axesRadius,
-        display.alpha,
-    )
-
-
-def _read_pose(message: Any) -> NDArray[np.float64]:
-    return matrix_of(message.pose)
-
-
-class PoseDisplay(_Shaped):
-    """A ``geometry_msgs/PoseStamped``. See its page in ``docs/scene.md``."""
-
-    TYPE = "Pose"
-    MESSAGES = ("geometry_msgs/PoseStamped",)
+        self._poses = self._poses[:0]
 
 
 class PoseArrayDisplay(TopicDisplay):
@@ -159,7 +168,7 @@ class PoseArrayDisplay(TopicDisplay):
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
-        self._flat, self._arrows, self._axes = Lines(), ArrowShapes(self), AxesShapes(self)
+        self._flat, self._shapes = Lines(), _PoseShapes(self, "Arrow (3D)")
         self._flat.owner = self
         self._poses: NDArray[np.float64] = np.zeros((0, 4, 4))
         super().__init__(parent, runtime)
@@ -171,9 +180,8 @@ class PoseArrayDisplay(TopicDisplay):
     def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
         """Show poses."""
         self._poses = data
-        for part in (self._flat, self._arrows, self._axes):
-            part.pose = pose
-        self.root.add(self._flat, self._arrows, self._axes)
+        self._flat.pose = self._shapes.pose = pose
+        self.root.add(self._flat, self._shapes)
         self._restyle()
 
     def _restyle(self) -> None:
@@ -181,7 +189,7 @@ class PoseArrayDisplay(TopicDisplay):
         self._flat.set_segments(
             _flat_arrows(flat, self.arrowLength), (*rgb_of(self.color), self.alpha)
         )
-        _set_shapes(self, self._arrows, self._axes, self._poses, "Arrow (3D)")
+        self._shapes.draw(self._poses)
 
 
 def _read_poses(message: Any) -> NDArray[np.float64]:
@@ -244,9 +252,11 @@ class _Uncertainty(NamedTuple):
     cone: NDArray[np.float64] | None
 
 
-class _WithCovariance(_Shaped):
+class _WithCovariance(TopicDisplay):
     """A display of poses with covariances."""
 
+    shape, color, alpha, *_lengths = _shape_settings()
+    shaftLength, shaftRadius, headLength, headRadius, axesLength, axesRadius = _lengths
     covariance = Setting("Covariance", "bool", True, "Whether covariances are shown.")
     covariancePosition = Setting(
         "Covariance/Position", "bool", True, "Of positions.", shown_if=_COVARIANCE
@@ -292,6 +302,9 @@ class _WithCovariance(_Shaped):
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
+        self._pose_shapes = _PoseShapes(self)
+        #: In the fixed frame, the oldest first.
+        self._poses: list[NDArray[np.float64]] = []
         #: Beside each pose: its covariance, and the rotation of its frame in the fixed frame.
         self._covariances: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
         #: What the first of them are drawn as, with the settings that it depends on.
@@ -319,16 +332,16 @@ class _WithCovariance(_Shaped):
             self.delete_status("Covariance")
 
     def _draw(self) -> None:
-        self.root.add(self._uncertain)
-        super()._draw()
+        self.root.add(self._uncertain, self._pose_shapes)
+        self._restyle()
 
     def reset(self) -> None:
         """Drop all poses."""
         super().reset()
-        self._covariances, self._shapes = [], []
+        self._poses, self._covariances, self._shapes = [], [], []
 
     def _restyle(self) -> None:
-        super()._restyle()
+        self._pose_shapes.draw(stack_poses(self._poses))
         look = (
             *(self.covariance, self.covariancePosition, self.positionScale),
             *(self.covarianceOrientation, self.orientationFrame),

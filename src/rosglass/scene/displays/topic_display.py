@@ -11,19 +11,16 @@ import logging
 import math
 import time
 from collections import deque
-from contextlib import suppress
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from rosglass.comm.names import similar
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import Error
-from rosglass.interfaces.names import ros1_name
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qml.engine.session import weak_callback
-from rosglass.qt import Slot, is_alive
-from rosglass.scene.configs.rviz_formats import TopicSetting, read_topic, write_topic
+from rosglass.qt import is_alive
+from rosglass.scene.configs.rviz_formats import TopicSetting, read_topic
 from rosglass.scene.configs.settings import Setting
-from rosglass.scene.displays.display import LATE_S, OUTDATED_ALPHA, Display, Status
+from rosglass.scene.displays.display import LATE_S, OUTDATED_ALPHA, Display
 from rosglass.scene.displays.message_queue import (
     MAX_WAITING_BYTES,
     MOST_WAITING,
@@ -33,6 +30,7 @@ from rosglass.scene.displays.message_queue import (
     drop_oldest,
     size_of,
 )
+from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -44,9 +42,11 @@ if TYPE_CHECKING:
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
 
-__all__ = ["OneTopicDisplay", "TopicDisplay"]
+__all__ = ["HistoryDisplay", "TopicDisplay"]
 
 _log = logging.getLogger("rosglass.scene")
+#: Messages that one display shows beside each other.
+_MAX_HISTORY = 10_000
 
 #: The policy that matches every publisher; RViz does not have it.
 BEST_AVAILABLE = "Best Available"
@@ -71,156 +71,7 @@ _MOST_MISSES = 25
 _CONTINUOUS_S = 3.0
 
 
-class OneTopicDisplay(Display):
-    """A display of one topic, with its settings in the files of either RViz.
-
-    Attributes:
-        MESSAGES: Names of the types that it shows, without ``msg/``.
-        SUGGESTED: Those of topics that panels suggest for it, if these are fewer.
-    """
-
-    MESSAGES: ClassVar[tuple[str, ...]] = ()
-    SUGGESTED: ClassVar[tuple[str, ...]] = ()
-
-    topic = Setting("Topic", "topic", "", "Topic to subscribe to.", then="_on_topic")
-    depth = Setting(
-        "Topic/Depth", "int", 5, "Messages kept until their transform is known.", min=1, max=1000,
-        then="_schedule",
-    )  # fmt: skip
-
-    #: How many messages were received.
-    received = ReadOnly(int, 0)
-    #: Whether the topic has had the time to be found.
-    _is_searched = False
-    #: The depth of a file, and the one that is used for it: RViz has no limit, and 0 for any.
-    _depth_of_file: tuple[int | None, int | None] = (None, None)
-
-    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file of either RViz, which write topics differently."""
-        refused = super().load_settings({k: v for k, v in saved.items() if k != "Topic"})
-        try:
-            given = read_topic(saved)
-            self._load_topic(given)
-            if given.depth and given.depth != self.depth:
-                text = f"Depth: {given.depth} is out of range; {self.depth} is used"
-                refused.append(f"{text}, and the file keeps it")
-        except Error as error:
-            refused.append(str(error))
-        return refused
-
-    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
-        """Return the settings for a file of one RViz."""
-        kept = super().save_settings({k: v for k, v in (older or {}).items() if k != "Topic"})
-        topic = dict(older or {}).get("Topic")
-        kept.pop("Topic", None)
-        if topic is not None:
-            kept["Topic"] = topic
-        write_topic(kept, self._saved_topic(), ros)
-        return kept
-
-    def _load_topic(self, given: TopicSetting) -> None:
-        self.set("Topic", given.name)
-        if given.depth:
-            limits = self.SETTINGS["Topic/Depth"].kind.options
-            self.depth = min(max(given.depth, limits["min"]), limits["max"])
-        self._depth_of_file = (given.depth, self.depth)
-
-    def _saved_topic(self) -> TopicSetting:
-        given, used = self._depth_of_file
-        return TopicSetting(
-            self.topic, self.depth if given is None or self.depth != used else given
-        )
-
-    def suggested(self, path: str) -> tuple[str, ...]:  # noqa: ARG002 - for subclasses
-        """Return the types of the topics that panels suggest for a setting."""
-        return self.SUGGESTED or self.MESSAGES
-
-    def on_group_enabled(self) -> None:
-        """Receive something, or nothing any more, as it or its group is shown or hidden."""
-        super().on_group_enabled()
-        if not self.shown:
-            self._close_endpoint()  # not later: messages of it may be on their way
-            self.reset()  # it would be old when the display is shown again
-
-    def _find_topic(self) -> str:
-        """Return the absolute name of the topic; empty, with a status, while there is none."""
-        if self.node is None or not self.shown or self.scene is None:
-            return ""
-        if not self._topic:
-            self.set_status("Topic", "warn", "no topic is chosen")
-            return ""
-        self._resolved = self._resolve(self._topic)
-        if not self._resolved:
-            self.set_status("Topic", "error", self._problem)
-        return self._resolved
-
-    def _begin_to_wait(self) -> None:
-        """Say that nothing was received, and after a while that there is no publisher."""
-        self._is_searched = False
-        self.delete_status("Topic")
-        self._report_waiting()
-        self._expect_publishers()
-
-    def _is_waiting(self) -> bool:
-        """Return whether nothing was received yet."""
-        line = self.status_lines.get("Topic")
-        return self._endpoint is not None and (line is None or line.level != "ok")
-
-    def _report_waiting(self) -> None:
-        """Say in the status what is received, as long as that is nothing, and why."""
-        if self._is_waiting():
-            level, text = self._find_reason()
-            if level == "error" and Status(level, text) != self.status_lines.get("Topic"):
-                # For interfaces that show no status.
-                self._log(f"{self._topic_in_logs()}: {text}", logging.WARNING)
-            self.set_status("Topic", level, text)
-
-    def _find_reason(self) -> tuple[str, str]:
-        """Return why nothing was received: level and text."""
-        node, session, topic = self.node, self._session, self._resolved
-        text = f"No messages received on {topic}"
-        if node is None or session is None or session.state != "connected":
-            return "warn", text
-        # The node may just have been closed.
-        with suppress(Error):
-            topics = node.topics()
-            types = topics.get(topic, ())
-            if types and self.MESSAGES and not set(map(ros1_name, types)) & set(self.MESSAGES):
-                wanted = " or ".join(self.MESSAGES)
-                return "error", f"the topic's type is {', '.join(types)}, not {wanted}"
-            if self._is_searched and not self._count_publishers():
-                text = f"{text}: it has no publisher{similar(topic, topics)}"
-            elif problem := getattr(self._endpoint, "problem", ""):
-                text = f"{text}: {problem}"
-            elif self._count_publishers() and (hint := getattr(self._endpoint, "hint", "")):
-                text = f"{text}: {hint}"
-        return "warn", text
-
-    def _topic_in_logs(self) -> str:
-        return f"{self.label}: {self._resolved}"
-
-    @Slot()
-    def _log_no_publisher(self) -> None:
-        super()._log_no_publisher()
-        self._is_searched = True
-        self._report_waiting()
-
-    @Slot()
-    def _on_graph(self) -> None:
-        super()._on_graph()
-        self._report_waiting()
-
-    def _on_topic(self) -> None:
-        self._topic = self.topic
-        self._set_problem("")
-        self._resolved = ""
-        self._close_endpoint()  # not later: messages of it may be on their way
-        self.clear_status()
-        self.reset()
-        self._schedule()
-
-
-class TopicDisplay(OneTopicDisplay):
+class TopicDisplay(Display):
     """A display of the messages of one topic.
 
     Attributes:
@@ -231,6 +82,7 @@ class TopicDisplay(OneTopicDisplay):
             after twice the time between messages.
     """
 
+    TOPIC_KEYS: ClassVar[tuple[str, ...]] = ("Topic",)
     KEEPS_ALL: ClassVar[bool] = False
     IS_CONTINUOUS: ClassVar[bool] = False
     #: Whether parts of a message have frames of their own, as markers do.
@@ -241,6 +93,11 @@ class TopicDisplay(OneTopicDisplay):
         reliability=Reliability.BEST_AVAILABLE, durability=Durability.BEST_AVAILABLE
     )
 
+    topic = Setting("Topic", "topic", "", "Topic to subscribe to.", then="_on_topic")
+    depth = Setting(
+        "Topic/Depth", "int", 5, "Messages kept until their transform is known.", min=1, max=1000,
+        then="_schedule",
+    )  # fmt: skip
     reliability = Setting(
         "Topic/Reliability Policy", "enum", BEST_AVAILABLE, "What publishers have to offer.",
         choices=list(_RELIABILITY), then="_schedule",
@@ -249,6 +106,9 @@ class TopicDisplay(OneTopicDisplay):
         "Topic/Durability Policy", "enum", BEST_AVAILABLE, "Whether earlier messages are wanted.",
         choices=list(_DURABILITY), then="_schedule",
     )  # fmt: skip
+
+    #: How many messages were received.
+    received = ReadOnly(int, 0)
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -267,10 +127,13 @@ class TopicDisplay(OneTopicDisplay):
         self._intervals = deque((0.0, 0.0), maxlen=2)
         super().__init__(parent, runtime)
 
-    def _load_topic(self, given: TopicSetting) -> None:
-        super()._load_topic(given)
+    # -- files -----------------------------------------------------------------------------------
+
+    def _load_topic(self, saved: Mapping[str, Any]) -> list[str]:
+        refused, given = super()._load_topic(saved), read_topic(saved)
         self.reliability = given.reliability or self.reliability
         self.durability = given.durability or self.durability
+        return refused
 
     def _saved_topic(self) -> TopicSetting:
         # What is ours alone, no RViz can read; without a policy, it is that again.
@@ -282,6 +145,13 @@ class TopicDisplay(OneTopicDisplay):
         return saved._replace(reliability=reliability, durability=durability)
 
     # -- the subscription ------------------------------------------------------------------------
+
+    def on_group_enabled(self) -> None:
+        """Receive messages, or none any more, as it or its group is shown or hidden."""
+        super().on_group_enabled()
+        if not self.shown:
+            self._close_endpoint()  # not later: messages of it may be on their way
+            self.reset()  # they would be old when the display is shown again
 
     def shows_all(self) -> bool:
         """Return whether each message is shown, in order, and not only the newest."""
@@ -603,3 +473,79 @@ class TopicDisplay(OneTopicDisplay):
         self._dropped = 0
         self.delete_status("Dropped messages")
         self.root.clear()
+
+
+class _Kept(NamedTuple):
+    """A message that is shown.
+
+    Attributes:
+        data: What was read from it.
+        pose: Of its frame in the fixed frame.
+        group: What it draws.
+    """
+
+    data: Any
+    pose: NDArray[np.float64]
+    group: Group
+
+
+class HistoryDisplay(TopicDisplay):
+    """A display of the last messages, each drawn on its own.
+
+    Attributes:
+        LENGTH: The setting of how many are shown; empty for the newest one alone.
+    """
+
+    LENGTH: ClassVar[str] = ""
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._kept: deque[_Kept] = deque()
+        super().__init__(parent, runtime)
+
+    def length(self) -> int:
+        """Return how many messages are shown."""
+        return int(self.get(self.LENGTH)) if self.LENGTH else 1
+
+    def shows_all(self) -> bool:
+        """Return whether earlier messages are shown as well."""
+        return self.length() > 1
+
+    def most_waiting(self) -> int:
+        """Return how many messages may wait: no more than are shown."""
+        return max(int(self.depth), min(self.length(), MOST_WAITING))
+
+    def draw(self, data: Any, group: Group) -> None:
+        """Fill a group with what a message shows, in its frame."""
+        raise NotImplementedError
+
+    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
+        """Show a message beside earlier ones."""
+        group = Group()
+        group.pose = pose
+        self._kept.append(_Kept(data, pose, group))
+        self.root.add(group)
+        self.draw(data, group)
+        self._drop_old()
+
+    def _drop_old(self) -> None:
+        length = self.length()
+        while len(self._kept) > min(length, _MAX_HISTORY):
+            self._kept.popleft().group.remove()
+        if len(self._kept) == _MAX_HISTORY < length:
+            self.set_status(self.LENGTH, "warn", f"only the latest {_MAX_HISTORY} are shown")
+        else:
+            self.delete_status(self.LENGTH)
+
+    def _restyle(self) -> None:
+        self._drop_old()
+        for kept in self._kept:
+            kept.group.clear()
+            self.draw(kept.data, kept.group)
+
+    def reset(self) -> None:
+        """Drop all messages."""
+        super().reset()
+        self._kept.clear()
+        self._drop_old()
