@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Every check, quickest first: scripts/test.sh [--all] [ARGUMENT OF PYTEST...]
 #   --all  every test in both versions of Qt and in RViz, all mutants, and every type against every peer
-# Runs all groups even if one has failed. Ends with the seconds of each group and, in the last line,
-# with pytest's closing line for all of them.
+# Runs all groups even if one has failed. Ends with the tests that failed, also those that passed on
+# their rerun, with the seconds of each group and, in the last line, with pytest's closing line for
+# all of them.
 # BASE=COMMIT is what RViz's sources are compared with (scripts/unchanged.sh).
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -35,6 +36,7 @@ group() { # NAME COMMAND...
   # No test of a group may match the arguments, as those of `-k`.
   ((code != 5)) || [[ -z ${arguments[*]-} ]] || code=0
   printf '%s\t%s\t%s\t%s\n' "$((SECONDS - begin))" "$code" "$name" "$(tail -n 1 "$output")" >>"$results/rows"
+  grep -E '^(FAILED|ERROR|RERUN) tests/' "$output" | cut -c -200 >>"$results/failures" || true
   say "$name: $((SECONDS - begin)) s, exit code $code"
 }
 # A group that is not run, and why.
@@ -83,7 +85,6 @@ rviz_sources=(src/rosglass/{overlay,rviz,qml,qt,images,demo} tests/rviz tests/he
   examples pyproject.toml scripts/setup.sh scripts/test.sh)
 
 # Once more what failed, with windows and other programs: those can fail on machines under load.
-# Each is listed at the end.
 once_more=(--reruns 1 --rerun-show-tracebacks)
 units=(tests/unit/ros[12] tests/contract tests/unit/[!r_]*/ tests/unit/test_*.py)
 qt5="tests of interfaces in Qt 5 ($(.venv-system/bin/python -V), PySide2)"
@@ -137,4 +138,8 @@ group "tests of the 3D view ($(.venv/bin/python -V), PySide6)" run .venv 3 "${on
 group "$qt6" run .venv 4 "${once_more[@]}" tests/gui
 gather
 [[ -z $alone ]] || group "$programs" run .venv 6 "${once_more[@]}" tests/interop
+if [[ -s $results/failures ]]; then
+  say "tests that failed; RERUN: once, and passed on their rerun unless they are also FAILED"
+  sort -u "$results/failures"
+fi
 .venv/bin/python scripts/closing_line.py "$SECONDS" <"$results/rows"
