@@ -27,7 +27,7 @@ from rosglass.qml.elements.yaml_io import Io
 from rosglass.qt import QtCore
 
 PAGE = Path(__file__).parents[1] / "docs" / "compatibility.md"
-#: What only functions return, by the name that the reference gives it.
+#: Types that only functions return, by the name in the reference.
 RETURNED = {
     "Ros": {
         "ActionClient": RosActionClient,

@@ -1,9 +1,9 @@
-"""Take the pictures of the examples that the documentation shows.
+"""Takes the screenshots of the examples for the documentation.
 
     xvfb-run -s "-screen 0 1280x800x24" python scripts/example_pictures.py [NAME ...]
 
-Starts a Zenoh router, the simulated robot and what an example needs besides. Pictures get few
-colours, and so few bytes.
+Starts a Zenoh router, the simulated robot and what else an example needs. Screenshots are reduced
+to few colours, and so to few bytes.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ AFTER = {"replay": 12, "image_publisher": 8, "camera": 8}
 ROSGLASS = [sys.executable, "-m", "rosglass.cli"]
 #: Pixels left below what an example shows.
 MARGIN = 20
-#: Bytes that a picture may have; those of cameras are made smaller until they fit.
+#: Maximum bytes of a screenshot; larger ones, of camera images, are scaled down until they fit.
 MOST = 40_000
 
 
 def main(names: list[str]) -> None:
-    """Take these pictures; all without names."""
+    """Take these screenshots; all of them without names."""
     TARGET.mkdir(parents=True, exist_ok=True)
     patterns = ("*.qml", "ros1/*.qml", "paper/figure*.qml")
     files = [file for pattern in patterns for file in sorted(EXAMPLES.glob(pattern))]
@@ -55,7 +55,7 @@ def main(names: list[str]) -> None:
 
 
 def shrink(file: Path) -> None:
-    """Write a picture anew without what is empty below, with 64 colours, as small as it must be."""
+    """Crop empty space at the bottom, and reduce the file to 64 colours and the maximum size."""
     whole = Image.open(file).convert("RGB")
     corner = whole.getpixel((whole.width - 1, whole.height - 1))
     assert corner is not None

@@ -28,9 +28,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-#: What a NamedTuple has for everybody.
+#: Underscored attributes of NamedTuples that are public.
 _OF_TUPLES = {"_replace", "_asdict", "_fields", "_make"}
-#: What rospy's generated classes have for everybody: genpy documents them, without other names.
+#: Underscored attributes of rospy's generated classes that genpy documents.
 _OF_GENPY = {
     "_buff",
     "_connection_header",
@@ -363,7 +363,7 @@ def main() -> None:
     root = options.checkout.resolve()
     package = root / "src" / "rosglass"
     if not package.is_dir():
-        parser.error(f"{root} is no checkout of rosglass: {package} is missing")
+        parser.error(f"{root} is not a checkout of rosglass: {package} is missing")
     source, tests = read(package), read(root / "tests")
     graph = import_graph(package, source)
     groups, inside = cycles(graph)

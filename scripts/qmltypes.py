@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Describe the QML modules for editors and qmllint: ``imports*/*/plugins.qmltypes``.
 
-With ``--write`` the files are written; without, their differences are told. Run it with PySide6.
+With ``--write`` it writes the files; without, it prints the differences. Run it with PySide6.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
 FOLDER = modules.IMPORT_PATHS[0]
-#: Of modules that need Qt 6.
+#: Folder of modules that need Qt 6.
 FOLDER6 = FOLDER.with_name("imports6")
-#: What JavaScript may be given anything for, or gets objects of types that have no name in QML.
+#: Types through which JavaScript passes any value, or gets objects whose types have no name in QML.
 _ANY = {"QJSValue", "QVariant", "PyObject", "QObject*", "QJSValueList"}
 #: Bases of Qt that its own descriptions leave out.
 _UNNAMED = {"QQuickRhiItem"}

@@ -108,7 +108,7 @@ NOTES = {
     ),
     ("Ros", "Service", "callAsync"): ("better", "calls the callback for unknown types, too"),
     ("Ros", "Console", "setLoggerLevel"): ("same", ""),
-    ("Ros", "TfTransform", "rate"): ("better", "0 is no limit, as documented"),
+    ("Ros", "TfTransform", "rate"): ("better", "0 means no limit, as documented"),
     ("Ros", "TfTransform", "valid"): ("better", "`message` changes before `validChanged`"),
     ("Ros", "TfTransform", "rotation"): ("better", "the identity while unknown"),
     ("Ros", "ActionClient", "connected"): ("better", _LOST),
