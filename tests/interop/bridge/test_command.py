@@ -66,7 +66,7 @@ def test_it_lists_what_maps(master, router, connect):
     [
         ((), "nothing is to be relayed"),
         (("--all", "--topic", "/a"), "exclude each other"),
-        (("--topic", "/a b"), "no name of a topic"),
+        (("--topic", "/a b"), "is not the name of a topic"),
         (("--topic", "/a", "--qos", "best"), "expected one of default"),
         (("--topic", "/a", "--type", "/a:=nowhere_msgs/Thing"), "nowhere_msgs"),
     ],
