@@ -66,8 +66,7 @@ gather() {
 outputs=()
 arguments=("$@")
 
-# Most tests wait for others most of the time: six side by side, each file in one process.
-# RViz draws on the processor: four of them keep two cores busy.
+# Each file in one process; the processes of a group mostly wait for others.
 # A process that crashes fails its test and is not replaced: the others would wait for it for ever.
 # Files in the order of their folders, first those that wait for others: by default, those of few
 # tests come last, which are the same here, and the end would be spent on waiting for one of them.
@@ -92,52 +91,56 @@ qt6="tests of interfaces in Qt 6 ($(.venv/bin/python -V), PySide6)"
 in_rviz="tests in RViz ($(.venv-system/bin/python -V))"
 holds_everywhere="unit tests, and what holds on every wire"
 
-# Types take longest, on one core: they are checked beside everything else up to the unit tests, in
-# the time that those leave, and must not slow them down.
-background group "types (mypy --strict)" nice -n 19 .venv/bin/mypy
+# Three rows of groups side by side, each about as long as the others: only then are two cores busy,
+# as programs mostly wait for each other, windows keep the processor busy, and unit tests do either.
+with_programs() {
+  if [[ -e /usr/include/ros/ros.h ]]; then
+    group "a node of roscpp to test against" .venv/bin/python tests/interop/ros1/peers/build_roscpp.py .pytest_cache/d/roscpp
+  fi
+  group "tests with other programs ($(.venv/bin/python -V))" run .venv 5 "${once_more[@]}" tests/interop
+}
+# Apart from tests/gui: the 3D view needs an X server, other windows are drawn offscreen; and a
+# process has one Qt application, of which RViz needs one of its own kind.
+on_screens() {
+  local reason
+  if [[ -z $all ]] && reason=$(scripts/unchanged.sh "${rviz_sources[@]}"); then
+    leave_out "$in_rviz" "$reason (make test-all runs them)"
+  else
+    group "$in_rviz" run .venv-system 4 "${once_more[@]}" tests/rviz
+  fi
+  if [[ -n $all ]]; then
+    group "$qt5" run .venv-system 4 "${once_more[@]}" tests/gui
+  else
+    group "$qt5, where it can differ from Qt 6" run .venv-system 4 "${once_more[@]}" -m both_qt tests/gui
+  fi
+  group "tests of the 3D view ($(.venv/bin/python -V), PySide6)" run .venv 3 "${once_more[@]}" tests/scene
+}
+
+# Types take long, on one core: they begin first, and others go before them.
+background group "types (mypy --strict)" nice -n 5 .venv/bin/mypy
 group "lint and format (ruff)" lint
 group "words (the glossary of CONTRIBUTING.md)" .venv/bin/python scripts/words.py
+# One row after the other where they would share a network, and with it ROS domains.
+row=
+if scripts/private_network.sh sh -c '[ -n "${ROSGLASS_PRIVATE_NETWORK-}" ]' 2>/dev/null; then
+  row=background
+fi
+$row with_programs
+$row on_screens
 group "documentation (mkdocs --strict)" env NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
 group "wheel" scripts/check_wheel.sh
-if [[ -e /usr/include/ros/ros.h ]]; then
-  group "a node of roscpp to test against" .venv/bin/python tests/interop/ros1/peers/build_roscpp.py .pytest_cache/d/roscpp
-fi
-
 # Unit tests need no Qt: once for each Python is enough. Debian's has genpy to compare with.
 system="$(.venv-system/bin/python -V), Debian's own"
 if [[ -n $all ]]; then
-  group "$holds_everywhere ($system), every mutant" run .venv-system 6 --exhaustive "${units[@]}"
+  group "$holds_everywhere ($system), every mutant" run .venv-system 5 --exhaustive "${units[@]}"
 else
-  group "$holds_everywhere ($system), a tenth of the mutants" run .venv-system 6 "${units[@]}"
+  group "$holds_everywhere ($system), a tenth of the mutants" run .venv-system 5 "${units[@]}"
 fi
 if [[ "$(version .venv)" != "$(version .venv-system)" ]]; then
-  group "$holds_everywhere ($(.venv/bin/python -V))" run .venv 6 -m "not exhaustive" "${units[@]}"
+  group "$holds_everywhere ($(.venv/bin/python -V))" run .venv 5 -m "not exhaustive" "${units[@]}"
 fi
+group "$qt6" run .venv 5 "${once_more[@]}" tests/gui
 gather
-# Beside the tests with windows, which keep the processor busy, while programs wait for each other.
-# After them where they would share a network, and with it ROS domains.
-programs="tests with other programs ($(.venv/bin/python -V))"
-alone=1
-if scripts/private_network.sh sh -c '[ -n "${ROSGLASS_PRIVATE_NETWORK-}" ]' 2>/dev/null; then
-  alone=
-  background group "$programs" run .venv 4 "${once_more[@]}" tests/interop
-fi
-if [[ -n $all ]]; then
-  group "$qt5" run .venv-system 6 "${once_more[@]}" tests/gui
-else
-  group "$qt5, where it can differ from Qt 6" run .venv-system 6 "${once_more[@]}" -m both_qt tests/gui
-fi
-# Apart from tests/gui: a process has one Qt application, and RViz needs one of its own kind.
-if [[ -z $all ]] && reason=$(scripts/unchanged.sh "${rviz_sources[@]}"); then
-  leave_out "$in_rviz" "$reason (make test-all runs them)"
-else
-  group "$in_rviz" run .venv-system 4 "${once_more[@]}" tests/rviz
-fi
-# Apart from tests/gui: it needs an X server, the others are drawn offscreen.
-group "tests of the 3D view ($(.venv/bin/python -V), PySide6)" run .venv 3 "${once_more[@]}" tests/scene
-group "$qt6" run .venv 4 "${once_more[@]}" tests/gui
-gather
-[[ -z $alone ]] || group "$programs" run .venv 6 "${once_more[@]}" tests/interop
 if [[ -s $results/failures ]]; then
   say "tests that failed; RERUN: once, and passed on their rerun unless they are also FAILED"
   sort -u "$results/failures"
