@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +48,7 @@ def tables() -> dict[str, dict[str, str]]:
 
 TABLES = tables()
 BLOCKS = re.findall(r"```qml\n(.*?)```", PAGE, re.DOTALL)
+PROGRAMS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 #: What tells that several properties have changed, is Python's, or is for RosRviz's own QML.
 NOT_TOLD = {
     "objectName",
@@ -118,3 +121,47 @@ def test_interfaces_of_the_page_run(
     overlay = app.add_qml(file)
     wait.frames(3)
     assert overlay.problem == ""
+
+
+def run_program(text: str, master: str, folder: Path) -> str:
+    """Run a program of the page for a second, with interfaces of its names; return its errors."""
+    text = text.replace("ros1://robot:11311", master.replace("http", "ros1"))
+    quit_soon = "QtCore.QTimer.singleShot(1000, app.qt.quit)"
+    text = re.sub(r"(\s+)((?:code = )?app\.run\(\))", rf"\1{quit_soon}\1\2", text)
+    assert quit_soon in text
+    needed = "from rosglass.rviz.qt5 import QtCore\ndock = print\n"
+    (folder / "program.py").write_text(needed + text)
+    for name in ("dashboard", "map_legend"):
+        (folder / f"{name}.qml").write_text("import QtQuick 2.15\nText { text: 'ready' }")
+    done = subprocess.run(
+        [sys.executable, "program.py"],
+        check=False,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stderr
+
+
+@pytest.mark.parametrize("number", range(len(PROGRAMS)))
+def test_python_of_the_page_runs(
+    app: Any, master: str, tmp_path: Path, wait: Callable[..., None], number: int
+) -> None:
+    from rosglass.rviz.qt5 import QtWidgets
+
+    text = PROGRAMS[number]
+    if "app.run()" in text:
+        app.save_config(tmp_path / "robot.rviz")
+        errors = run_program(text, master, tmp_path)
+        assert "Traceback" not in errors
+        assert "ERROR" not in errors
+        return
+    my_widget = QtWidgets.QPushButton("Legend")
+    if "package://my_robot" in text:
+        (tmp_path / "look.qss").write_text("QPushButton { color: red }")
+        text = text.replace("package://my_robot", str(tmp_path))
+    exec(text, {"app": app, "my_widget": my_widget})
+    wait.frames(3)
+    assert [overlay.problem for overlay in app.overlays if overlay.problem] == []
