@@ -86,6 +86,14 @@ def test_dora_sends_us_goals(node, run_dora):
     accept = {"accept": lambda goal: goal.order < 1000}
     server = node.create_action_server("/count", FIBONACCI, count, **accept)
     process = run_dora(do="send goals", goals=[[5, False], [5000, False], [100, True]])
+    services = [f"/count/_action/{name}" for name in ("send_goal", "cancel_goal", "get_result")]
+    feedback = "/count/_action/feedback"
+    eventually(
+        lambda: all(map(node.service_clients, services)) and node.subscriptions(feedback),
+        "dora's clients and subscription",
+        timeout=60,
+    )
+    process.ask(go=True)
     assert process.event("status") == "succeeded"
     assert process.event("rejected") == 5000
     assert process.event("cancelled") == 0

@@ -94,7 +94,10 @@ class Dora:
             [plan["interfaces"]], transport=transport, domain_id=plan["domain"]
         )
         self.node = context.new_node(plan["name"], "/dora", dora.Ros2NodeOptions())
-        self.qos = dora.Ros2QosPolicies(reliable=True, keep_last=10)
+        # A client's reader gets the replies to all clients. RustDDS keeps as many that were not
+        # taken yet as the depth, at least 64: a client that waits for the processor would lose its
+        # own reply among those that others get.
+        self.qos = dora.Ros2QosPolicies(reliable=True, keep_last=1000)
         self.types = {"add": "example_interfaces/AddTwoInts", "blob": "blob_interfaces/Blob"}
         self.clients: dict[str, Any] = {}
         self.born = time.monotonic()
