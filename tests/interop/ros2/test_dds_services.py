@@ -212,6 +212,28 @@ def test_clients_of_all_kinds_at_one_server_get_their_own_replies(
         assert peer.event("answers") == [1000 * number + n for n in range(100)], KINDS[number]
 
 
+def test_replies_have_an_identity_as_soon_as_another_vendors_participant_is_known(
+    start_services, node, types, monkeypatch
+):
+    # dora's clients fail on one without: by multicast they get it before they are discovered here.
+    identities: list[Any] = []
+    write = cyclone_identity.write_reply
+
+    def write_reply(writer: Any, identity: Any, parts: Any) -> bool:
+        identities.append(identity)
+        return write(writer, identity, parts)
+
+    monkeypatch.setattr(cyclone_identity, "write_reply", write_reply)
+    bystander = start_services("dora", "bystander", ())
+    eventually(lambda: "/dora/bystander" in map(str, node.nodes()), what="dora's node")
+    with node.create_service_server("/sum", types[ADD], lambda r: {"sum": r.a + r.b}):
+        client = start_services("cyclone", "header_client", ())
+        assert call_us(client, "/sum", sums=[[n, 1] for n in range(5)]) == [1, 2, 3, 4, 5]
+    assert len(identities) == 5
+    client.end()
+    bystander.end()
+
+
 def test_two_of_our_clients_in_one_process_get_their_own_replies(node, dds_connect, types, peer):
     one = ready(node.create_service_client(f"/{peer.name}/add", types[ADD]))
     two = ready(dds_connect("other").create_service_client(f"/{peer.name}/add", types[ADD]))

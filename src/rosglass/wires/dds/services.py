@@ -421,7 +421,7 @@ class DdsReplier(Replier):
         self._service, self._on_request = endpoint.name, on_request
         #: Clients whose reply readers were found to be matched since the last change.
         self._matched_clients: set[bytes] = set()
-        self._has_foreign_readers = False
+        self._participant = participant
         #: The newest taken request of each client, by its writer; without Cyclone DDS's clients.
         self._newest: dict[bytes, int] = {}
         #: Origins, by id(), of requests left to the pump, which no request may overtake.
@@ -547,7 +547,7 @@ class DdsReplier(Replier):
             return answer.client not in self._endpoints.writers.all
         parts = with_header(data, answer.header) if answer.header else (data,)
         try:
-            if answer.header and not self._has_foreign_readers:
+            if answer.header and not self._may_reach_foreign_readers():
                 writer.write_parts(parts)
             elif (
                 not cyclone_identity.write_reply(writer, answer.identity, parts)
@@ -562,14 +562,21 @@ class DdsReplier(Replier):
     def _on_matched(self) -> None:
         """Update what depends on the matched clients."""
         self._matched_clients = set()
-        readers = () if self._endpoints.readers is None else self._endpoints.readers.all
         if len(self._newest) > _MAX_REMEMBERED:
             here = self._endpoints.writers.by_guid
             self._newest = {guid: last for guid, last in self._newest.items() if guid in here}
-        # RustDDS's clients fail on any reply without identity, even another client's.
-        self._has_foreign_readers = not cyclone_identity.writing.problem and any(
-            scheme_of(found.guid) is Scheme.IDENTITY for found in readers
-        )
+
+    def _may_reach_foreign_readers(self) -> bool:
+        """Return whether a reply may reach a reader that is not of Cyclone DDS.
+
+        RustDDS's clients fail on any reply without identity, even another client's. A multicast
+        reply reaches their readers before these are discovered here, but not before their
+        participant is.
+        """
+        seen = self._participant.seen
+        if seen is None or cyclone_identity.writing.problem:
+            return False
+        return any(scheme_of(prefix) is Scheme.IDENTITY for prefix in seen.prefixes())
 
     def _is_reader_matched(self, answer: _ReplyTarget) -> bool:
         """Return whether the client's reply reader is matched."""
