@@ -1,4 +1,4 @@
-"""Measure pictures through the bridge between ROS 1 and ROS 2, against decoding them fully.
+"""Measures images through the bridge between ROS 1 and ROS 2, against decoding them fully.
 
     python benchmarks/bridge.py [--seconds 8] [--hz 30] [--json FILE]
 
@@ -7,9 +7,9 @@ interface. "bridge" is the bridge as it is; "decoded" is the same with every mes
 Python values and encoded from them, arrays as lists of numbers left out: they stay numpy arrays;
 "elements" turns one message round element by element, alone, as a loop over all values would. A
 latency starts before the publisher's call and ends in the subscriber's callback. Needs Debian's
-rosmaster. Exits 1 when a target is missed, or when pictures are missing that neither the camera
-(its queue), nor the bridge (its queue), nor the viewer (the running numbers) has counted; each
-ends only when nothing moves any more, or what is on its way would be missed by nobody.
+rosmaster. Exits 1 when a target is missed, or when images are missing that neither the camera
+(its queue), nor the bridge (its queue), nor the viewer (the sequence numbers) has counted; each
+ends only when nothing arrives any more, so that images on their way are counted.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 IMAGE, TOPIC = "sensor_msgs/msg/Image", "/picture"
 WIDTH, HEIGHT = 1920, 1080
 NAME = "rosglass_bridge_benchmark"
-#: At most so much of a core for 30 full HD pictures a second, through the bridge.
+#: Maximum share of a core for 30 full HD images a second, through the bridge.
 CPU = 0.75
-#: At most so long for a picture on its way, in milliseconds, the median.
+#: Maximum median latency of an image in milliseconds.
 LATENCY = 60.0
 #: At least so many times as fast as element by element.
 RATIO = 100.0
@@ -97,8 +97,8 @@ def subscribe(plan: dict[str, Any]) -> None:
         sys.stdin.readline()
         settle(lambda: len(found))
         counts = made.statistics()
-    told = {"latencies": found, "lost": counts.lost, "dropped": counts.dropped}
-    print(json.dumps(told), flush=True)
+    figures = {"latencies": found, "lost": counts.lost, "dropped": counts.dropped}
+    print(json.dumps(figures), flush=True)
 
 
 def bridge(plan: dict[str, Any]) -> None:
@@ -135,7 +135,7 @@ def start(role: str, plan: dict[str, Any]) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
-def told(process: subprocess.Popen[str]) -> dict[str, Any]:
+def figures_of(process: subprocess.Popen[str]) -> dict[str, Any]:
     out, _ = process.communicate("end\n", timeout=90)
     found: dict[str, Any] = json.loads(out)
     return found
@@ -146,7 +146,7 @@ def measure(plan: dict[str, Any]) -> dict[str, Any]:
     camera = start("publish", plan)
     try:
         sent = json.loads(camera.communicate(timeout=plan["seconds"] + 60)[0])
-        between, there = told(relay), told(viewer)
+        between, there = figures_of(relay), figures_of(viewer)
     finally:
         for process in (viewer, relay, camera):
             process.kill()
@@ -168,7 +168,7 @@ def measure(plan: dict[str, Any]) -> dict[str, Any]:
 
 
 def alone() -> dict[str, float]:
-    """Return milliseconds for turning one picture round."""
+    """Return the milliseconds for converting one image."""
     import rosglass
     from rosglass.messages import Translation
 
@@ -237,7 +237,7 @@ def main() -> int:
         master.wait()
     for one in found:
         print(
-            f"{one['way']:8} {one['received']} of {one['sent']} pictures, median "
+            f"{one['way']:8} {one['received']} of {one['sent']} images, median "
             f"{one['median_ms']:.1f} ms, 95 % {one['p95_ms']:.1f} ms, {one['cpu']:.0%} of a core, "
             f"{one['relayed']} relayed; dropped by the camera {one['camera_dropped']}, by the "
             f"bridge {one['dropped']}, on the way to the viewer {one['lost']}"

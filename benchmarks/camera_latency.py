@@ -1,24 +1,24 @@
-"""Measure how long a camera picture takes from the robot's process to pixels on the X server.
+"""Measures how long a camera image takes from the robot's process to pixels on the X server.
 
     python benchmarks/camera_latency.py [--seconds N] [--rounds N] [--only NAME ...]
 
 A router, a camera at 30 Hz and an interface run as processes of their own; the interface draws on
-Xvfb with software OpenGL. The camera paints the moment of publishing and the picture's number into
-each picture, as a line of black and white squares. This program asks the X server about a thousand
-times a second for the pixels of that line: the first time a new number is there, the picture has
+Xvfb with software OpenGL. The camera paints the moment of publishing and the image's number into
+each image, as a line of black and white squares. This program asks the X server about a thousand
+times a second for the pixels of that line: the first time a new number is there, the image has
 arrived, whatever software believes. A figure can be too high by one such interval (printed), never
 too low.
 
-`listing` is the paper's Listing 1 (picture, drag area, button) in a 640x480 window, the interface
+`listing` is the paper's Listing 1 (image, drag area, button) in a 640x480 window, the interface
 that the C++ plugin for ROS 1 was measured with on the same kind of machine. `plain` is a PySide6
-program with the same items that makes the same pictures itself, in a thread, and pushes them into
-a QVideoSink: no robot, no network. Pictures travel over TCP once, from node to node, as those of
+program with the same items that makes the same images itself, in a thread, and pushes them into
+a QVideoSink: no robot, no network. Images travel over TCP once, from node to node, as those of
 ROS 2 do on one machine; with `ros1` they do so as ROS 1 has it, with Debian's rosmaster. With
 `shm`, Zenoh hands them over in shared memory, which both sides have to ask for. `one preview` and
 `eight previews` show one camera once, and eight times (three by three, less one), in a 640x480
 window. `cockpit` is the demo's whole screen, 1340x800, with the simulated robot. Contenders take
-turns, round by round; figures are medians of the rounds. Exits 1 when a target is missed or a
-picture is missing.
+turns, round by round; figures are medians of the rounds. Exits 1 when a target is missed or an
+image is missing.
 """
 
 from __future__ import annotations
@@ -142,8 +142,8 @@ class Contender:
     Attributes:
         name: Its name.
         qml: Its source; empty for the demo's cockpit.
-        size: Width and height of the camera's pictures.
-        shown: Width and height of the first picture's item, whose top left corner is the screen's.
+        size: Width and height of the camera's images.
+        shown: Width and height of the first image's item, whose top left corner is the screen's.
         plain: Whether it runs without rosglass.
         options: What the address of the robot ends with.
         ros1: Whether camera and interface speak ROS 1 instead of Zenoh.
@@ -213,7 +213,7 @@ class Pixels:
 
 @dataclass
 class Result:
-    """What was seen of one interface."""
+    """The measurements of one interface."""
 
     latencies: list[float] = field(default_factory=list)
     missing: int = 0
@@ -223,12 +223,12 @@ class Result:
     memory: float = 0.0
 
     def percentile(self, share: float) -> float:
-        """Return the latency that `share` percent of the pictures stayed below, ms."""
+        """Return the latency that `share` percent of the images stayed below, ms."""
         return 1000 * float(np.percentile(self.latencies, share)) if self.latencies else np.nan
 
 
 def watch(pixels: Pixels, seconds: float) -> Result:
-    """Follow the pictures on the screen."""
+    """Follow the images on the screen."""
     result = Result()
     last = None
     begin = time.monotonic()
@@ -236,7 +236,7 @@ def watch(pixels: Pixels, seconds: float) -> Result:
         row = pixels.read()
         seen = time.time_ns()
         result.polls += 1
-        # A line that is half replaced does not count: its picture is not there yet.
+        # A line that is half replaced does not count: its image is not there yet.
         with contextlib.suppress(framecode.FrameCodeError):
             code = framecode.read(row)
             if last is not None and code.number != last:
@@ -283,11 +283,11 @@ def find_code(display: str, contender: Contender) -> tuple[int, int, int]:
                 framecode.read(Pixels(display, *at).read())
                 return at
         time.sleep(0.2)
-    raise SystemExit(f"{contender.name}: no picture of the camera on the screen")
+    raise SystemExit(f"{contender.name}: no image of the camera on the screen")
 
 
 def cockpit_places() -> list[tuple[float, float, float]]:
-    """Where the cockpit's picture can be: beside the panels, as high as the window allows."""
+    """Return where the cockpit's image can be: beside the panels, as high as the window allows."""
     gap, bar = 10, 44
     height = SCREEN[1] - bar - 2 * gap
     width = SCREEN[0] - 3 * gap - max(280, min(420, SCREEN[0] - 3 * gap - height * 4 / 3))
@@ -409,7 +409,7 @@ def judge(results: dict[str, list[Result]]) -> bool:
         missing = sum(result.missing for result in rounds)
         if missing and not name.startswith("plain"):
             missed = True
-            print(f"{name}: {missing} pictures MISSING")
+            print(f"{name}: {missing} images MISSING")
     return missed
 
 

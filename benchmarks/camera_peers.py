@@ -3,7 +3,7 @@
     python benchmarks/camera_peers.py camera URL WIDTH HEIGHT
     python benchmarks/camera_peers.py plain WIDTH HEIGHT QML_FILE
 
-Both make the same pictures at 30 Hz: a pattern, with the moment and the number in a line of
+Both make the same images at 30 Hz: a pattern, with the moment and the number in a line of
 squares.
 """
 
@@ -26,13 +26,13 @@ TOPIC = "/camera/image_raw"
 
 
 def code_place(width: int, height: int) -> tuple[int, int, int]:
-    """Return where the line of squares is in a picture, and the size of a square."""
+    """Return where the line of squares is in an image, and the size of a square."""
     square = framecode.SQUARE * max(1, width // 640)
     return width - (framecode.BITS + 1) * square, height - 2 * square, square
 
 
 class Film:
-    """Calls `show` with a picture and its stamp, ns, at 30 Hz; the memory is used again."""
+    """Calls `show` with an image and its stamp, ns, at 30 Hz; the memory is used again."""
 
     def __init__(self, width: int, height: int, show: Callable[[np.ndarray, int], None]) -> None:
         rows, columns = np.mgrid[:height, :width]
@@ -82,7 +82,7 @@ def camera(url: str, width: int, height: int) -> None:
 
 
 def plain(width: int, height: int, file: str) -> None:
-    """Show the pictures as the documentation of Qt teaches, converted in a thread of their own."""
+    """Show the images as Qt's documentation suggests, converted in a thread of their own."""
     import cv2
     from PySide6.QtCore import QObject, QSize, QUrl, Signal
     from PySide6.QtGui import QGuiApplication

@@ -11,7 +11,7 @@ and values.
 The time is from the start of the process (`rosglass run FILE`) until the X server (Xvfb, software
 OpenGL) shows it, whatever software believes: this program reads a line of its pixels about a
 thousand times a second, where the interface paints a pattern from the first frame on, and a second
-one when every text and picture has had a value. Contenders take turns, round by round; the first
+one when every text and image has had a value. Contenders take turns, round by round; the first
 round fills the caches of files and does not count. Figures are medians. Exits 1 when a first frame
 takes longer than the target.
 """
@@ -40,7 +40,7 @@ from rosglass.wires.zenoh.router import Router
 #: Seconds until the first frame.
 TARGET = 1.0
 SCREEN = (1280, 800)
-_PATIENCE = 30.0
+_TIMEOUT_S = 30.0
 #: Type, what the text shows of a message `m`, and a value of the field that changes.
 VALUES: tuple[tuple[str, str, str], ...] = (
     ("std_msgs/msg/String", "m.data", "data"),
@@ -242,7 +242,7 @@ def measure(command: list[str], screen: VirtualScreen, complete: bool) -> Result
                     first = now
                 if seen == COMPLETE or (first and not complete):
                     return Result(first, now)
-                if now > _PATIENCE or process.poll() is not None:
+                if now > _TIMEOUT_S or process.poll() is not None:
                     output.seek(0)
                     sys.exit(f"{command}: first frame {first:.2f} s, then: {output.read()}")
                 time.sleep(0.0007)

@@ -40,7 +40,7 @@ METRICS = {
     "first use": "first use: definition text -> first decoded message (us)",
     "memory": "memory of one decoded, untouched message beside its bytes (bytes)",
 }
-#: What a peer has to do for a metric that only we have.
+#: The peer's metric to compare with a metric that only we have.
 PEER_METRIC = {"path": "attribute", "parts": "encode"}
 
 

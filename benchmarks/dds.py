@@ -39,9 +39,9 @@ _FIRST = 5
 LATENCY_RATIO = 1.3
 #: At least this part of the rate of the quicker of them.
 RATE_RATIO = 0.8
-#: Median of a 6.2 MB picture at 30 Hz, in milliseconds.
+#: Median of a 6.2 MB image at 30 Hz, in milliseconds.
 IMAGE_MS = 5.0
-#: At most this share of one core for 1 kHz of PoseStamped that nobody reads.
+#: Maximum share of one core for 1 kHz of unread PoseStamped.
 UNREAD_CPU = 0.03
 BARE = ("listener", "waitset")
 
@@ -61,7 +61,7 @@ def connect(plan: dict[str, Any], name: str) -> Any:
 
 
 class Notes:
-    """What a subscriber noted: times of reception and of sending, in nanoseconds."""
+    """A subscriber's notes: times of reception and of sending, in nanoseconds."""
 
     def __init__(self) -> None:
         self.got: list[int] = []
@@ -326,7 +326,7 @@ def run(quick: bool, only: str) -> tuple[dict[str, Any], list[str]]:
     if "unread" in only:
         plan = common | {"case": "unread", "type": POSE, "hz": 1000}
         found = results["unread"] = best(plan, ("listener", "raw"), "cpu", top=False)
-        print("1 kHz of PoseStamped that nobody reads, share of one core")
+        print("1 kHz of unread PoseStamped, share of one core")
         print(f"  reader alone {found['listener']['cpu']:.1%}")
         print(
             f"  raw          {found['raw']['cpu']:.1%}"
@@ -356,7 +356,7 @@ def table(found: dict[str, Any], bare: float, case: str) -> list[str]:
 def main() -> int:
     cases = ("latency", "rate", "image", "unread")
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--quick", action="store_true", help="shorter runs, 90 pictures, once")
+    parser.add_argument("--quick", action="store_true", help="shorter runs, 90 images, once")
     parser.add_argument("--only", choices=cases, help="run this case only")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     parser.add_argument("--role", choices=["subscriber", "publisher"], help=argparse.SUPPRESS)

@@ -114,7 +114,7 @@ def sender(plan: dict[str, Any], dds_topic: str) -> Any:
     return send
 
 
-class Told(Listener):  # type: ignore[misc]
+class OnData(Listener):  # type: ignore[misc]
     """Takes samples, or their bytes, when there are some."""
 
     def __init__(self, take: Any) -> None:
@@ -152,7 +152,7 @@ def receive(plan: dict[str, Any], dds_topic: str, text: Any, stamp: Any, data: A
 
     listener = None
     if plan["case"] != "unread" and plan["how"] != "waitset":
-        listener = Told(take if plan["how"] == "listener" else take_bytes)
+        listener = OnData(take if plan["how"] == "listener" else take_bytes)
     reader = DataReader(participant, topic, qos=profile(plan), listener=listener)
     if plan["how"] == "waitset":
         waitset = WaitSet(participant)
@@ -188,8 +188,8 @@ def receive_by_dora(plan: dict[str, Any], ros_topic: str, stamp: Any) -> Any:
             if message is None:
                 time.sleep(0.0005)
                 continue
-            told = message[0]["header"]["stamp"]
-            stamp(told["sec"].as_py(), told["nanosec"].as_py())
+            sent = message[0]["header"]["stamp"]
+            stamp(sent["sec"].as_py(), sent["nanosec"].as_py())
 
     threading.Thread(target=run, daemon=True).start()
     return node, subscription

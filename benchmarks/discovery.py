@@ -29,7 +29,7 @@ TOPICS, SERVICES = 4, 6
 #: Seconds until everything must have been seen, and the share of a core afterwards.
 SECONDS, CPU = 2.0, 0.02
 _QUIET = 5.0
-_PATIENCE = 60.0
+_TIMEOUT_S = 60.0
 
 
 def topic(node: int, number: int) -> str:
@@ -102,8 +102,8 @@ def dds_robot(plan: dict[str, Any]) -> list[Any]:
             participant, Topic(participant, "ros_discovery_info", participant_info), qos=latched
         )
         gids = ([gid_of(reader) for reader in readers], [gid_of(writer) for writer in writers])
-        told = node_info("/robot", f"node_{node}", *gids)
-        teller.write(participant_info(gid_of(participant), [told]))
+        info = node_info("/robot", f"node_{node}", *gids)
+        teller.write(participant_info(gid_of(participant), [info]))
         kept += [participant, writers, readers, teller]
     return kept
 
@@ -237,7 +237,7 @@ def robot(plan: dict[str, Any]) -> None:
 
 
 def observer(plan: dict[str, Any]) -> None:
-    """Connect when told to; print how long it took to see everything, and the cost afterwards."""
+    """Connect on request; print how long it took to see everything, and the cost afterwards."""
     import rosglass
 
     rosglass.load(STRING)
@@ -248,7 +248,7 @@ def observer(plan: dict[str, Any]) -> None:
     sys.stdin.readline()
     began, cpu = time.monotonic(), time.process_time()
     kept = OBSERVERS[plan["world"], plan["way"]](plan, seen)
-    complete = seen.wait(_PATIENCE)
+    complete = seen.wait(_TIMEOUT_S)
     seconds, busy = time.monotonic() - began, time.process_time() - cpu
     time.sleep(0.5)
     before, start = time.process_time(), time.monotonic()
@@ -336,7 +336,7 @@ def main() -> int:
                     results.append(plan | found)
                     name = f"{world}, {way}" + (", live" if live else "")
                     if found["seconds"] is None:
-                        print(f"{name:18}never within {_PATIENCE:.0f} s")
+                        print(f"{name:18}never within {_TIMEOUT_S:.0f} s")
                         missed = True
                         continue
                     ratio = f"{found['seconds'] / bare:9.2f}x" if bare else ""

@@ -68,7 +68,7 @@ _ROBOT = (
     'chatter.message ? chatter.message.data : "waiting"',
     "onClicked: stop.publish({data: true})",
 )
-#: Of each interface: what `rosglass run` shows, and what the plain program shows.
+#: The file that `rosglass run` shows, and the one of the plain program, by interface.
 INTERFACES = {
     "trivial": (_TRIVIAL, _TRIVIAL),
     "robot": (_ITEMS % _ROBOT, _ITEMS % ("", "", "", '"waiting"', "")),
@@ -117,8 +117,8 @@ def main() -> int:
     )
     os.close(writer)
     try:
-        with os.fdopen(reader) as told:
-            display = f":{told.readline().strip()}"
+        with os.fdopen(reader) as ready:
+            display = f":{ready.readline().strip()}"
         environment = {k: v for k, v in os.environ.items() if k != "QT_QPA_PLATFORM"}
         # Byte code as every installation has it, also where none is written beside the sources.
         environment |= {"DISPLAY": display, "PYTHONDONTWRITEBYTECODE": ""}

@@ -1,9 +1,9 @@
-"""Measure how long pictures take to become showable, against the least that OpenCV needs.
+"""Measures how long images take to become showable, against the least that OpenCV needs.
 
     python benchmarks/images.py [--quick]
 
 The peer is what a viewer built on OpenCV does with the same bytes: `cv2.cvtColor` into memory that
-exists already, or `cv2.imdecode`. Both make RGBA; pictures of the encodings marked as shared are
+exists already, or `cv2.imdecode`. Both make RGBA; images of the encodings marked as shared are
 handed on untouched where the display takes them.
 """
 

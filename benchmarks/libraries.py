@@ -24,7 +24,7 @@ from samples import Sample, Value, build_any, builder, definition, store, walker
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-#: What is timed: a statement and the names it uses.
+#: A timed statement, and the names that it uses.
 Statement = tuple[str, dict[str, Any]]
 
 DEBIAN_PACKAGES = "/usr/lib/python3/dist-packages"

@@ -4,13 +4,13 @@
 
 Router, simulated robot and cockpit run as processes of their own, the cockpit on Xvfb with software
 OpenGL, steered in circles. Beside it, on a screen of its own, the peer: a plain PySide6 program
-that shows pictures of the same size at the same rate and has no robot, to tell what Qt and its
+that shows images of the same size at the same rate and has no robot, to measure what Qt and its
 software OpenGL keep for themselves. The first third of the time is the warm-up: code is imported
 when first used, caches fill, and the cockpit remembers the last five minutes, the way that the
-robot drove and the latencies of pictures.
+robot drove and the latencies of images.
 
 Own memory (USS) is what ending the process would give back: neither libraries that others use, nor
-pictures in memory shared with the X server. The slope is the median of the slopes between all pairs
+images in memory shared with the X server. The slope is the median of the slopes between all pairs
 of samples after the warm-up (Theil-Sen): neither a garbage collection nor a step that happens once
 decides, a leak does. The growth is the difference of the medians of the first and the last fifth.
 Exits 1 when the memory of one of our processes rose faster than the target, or a process ended.
@@ -41,7 +41,7 @@ from rosglass.wires.zenoh.router import is_router_reachable
 TARGET = 30.0
 #: Seconds of a round: so long the stick is pulled, then let go.
 _ROUND, _PULL = 20.0, 12.0
-_PATIENCE = 30.0
+_TIMEOUT_S = 30.0
 
 
 @dataclass
@@ -110,7 +110,7 @@ def watch(minutes: float, every: float) -> tuple[list[Watched], str]:
         VirtualScreen(*SCREEN) as other,
         contextlib.ExitStack() as stack,
     ):
-        told = stack.enter_context(Path(folder, "report.txt").open("w+"))
+        report = stack.enter_context(Path(folder, "report.txt").open("w+"))
 
         def start(name: str, *command: str, display: str = "", ours: bool = True) -> Watched:
             environment = {**os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
@@ -119,7 +119,7 @@ def watch(minutes: float, every: float) -> tuple[list[Watched], str]:
                 command,
                 env=environment,
                 stdin=subprocess.DEVNULL,
-                stdout=told if name == "cockpit" else subprocess.DEVNULL,
+                stdout=report if name == "cockpit" else subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
             )
             stack.callback(process.wait)
@@ -129,7 +129,7 @@ def watch(minutes: float, every: float) -> tuple[list[Watched], str]:
         port = free_port()
         router = start("router", *rosglass, "router", "--listen", f"tcp/127.0.0.1:{port}")
         url = f"zenoh://127.0.0.1:{port}"
-        until = time.monotonic() + _PATIENCE
+        until = time.monotonic() + _TIMEOUT_S
         while not is_router_reachable(url):
             if time.monotonic() > until:
                 sys.exit("the router does not answer")
@@ -157,9 +157,9 @@ def watch(minutes: float, every: float) -> tuple[list[Watched], str]:
             time.sleep(max(0.0, begin + now + every - time.monotonic()))
         shown = programs[0].process
         shown.terminate()
-        shown.wait(_PATIENCE)
-        told.seek(0)
-        return programs, told.read()
+        shown.wait(_TIMEOUT_S)
+        report.seek(0)
+        return programs, report.read()
 
 
 def free_port() -> int:
@@ -197,14 +197,14 @@ def main() -> int:
     parser.add_argument("--csv", type=Path, metavar="FILE", help="write every sample there")
     args = parser.parse_args()
     print(f"{args.minutes:g} minutes, load {os.getloadavg()[0]:.1f} before the start", flush=True)
-    programs, told = watch(args.minutes, args.every)
+    programs, report = watch(args.minutes, args.every)
     if args.csv:
         lines = ["program,seconds,own KiB,resident KiB"]
         for one in programs:
             rows = zip(one.times, one.own, one.resident, strict=True)
             lines += [f"{one.name},{a:.1f},{b:.0f},{c:.0f}" for a, b, c in rows]
         args.csv.write_text("\n".join(lines) + "\n")
-    print(told)
+    print(report)
     return int(judge(programs, 60 * args.minutes / 3))
 
 

@@ -1,4 +1,4 @@
-"""What it costs to show a fast topic in QML, and to hand long arrays to JavaScript.
+"""Measures the cost of showing a fast topic in QML, and of long arrays in JavaScript.
 
     python benchmarks/qml_values.py [seconds] [--rounds N]
 
@@ -9,7 +9,7 @@ into a property of type QVariant, to which the same five bindings are bound. Eac
 turns, without a screen. "Zenoh alone" receives as the peer does and shows nothing.
 
 The share of a core is that of the whole process, all threads; of these, those of Zenoh's runtime
-are told apart: what reading 1000 messages a second from a socket costs there is the same for
+are listed separately: what reading 1000 messages a second from a socket costs there is the same for
 everybody, and more than the target. What is left is Python's and Qt's. Work is the longest that the
 GUI thread computed without getting back to its event loop; the pause is the same by the clock,
 other programs of the machine included.
@@ -246,7 +246,7 @@ def main() -> int:
             for _ in range(args.rounds):
                 for way, results in found.items():
                     command = [sys.executable, __file__, "show", way, port, str(seconds)]
-                    told = subprocess.run(
+                    done = subprocess.run(
                         command,
                         check=False,
                         env=environment,
@@ -254,9 +254,9 @@ def main() -> int:
                         text=True,
                         timeout=120,
                     )
-                    if told.returncode or not told.stdout:
-                        sys.exit(f"{way}: {told.stdout}{told.stderr}")
-                    results.append(json.loads(told.stdout.splitlines()[-1]))
+                    if done.returncode or not done.stdout:
+                        sys.exit(f"{way}: {done.stdout}{done.stderr}")
+                    results.append(json.loads(done.stdout.splitlines()[-1]))
         finally:
             robot.kill()
             robot.wait(10)

@@ -48,12 +48,12 @@ _FIRST = 5
 IMAGE_RATIO, RATE_RATIO = 3.0, 2.0
 #: At most so many times roscpp's median latency.
 LATENCY_RATIO = 1.5
-#: At most this part of rospy's processor time for 1 kHz of PoseStamped that nobody reads.
+#: Maximum ratio to rospy's processor time for 1 kHz of unread PoseStamped.
 UNREAD_RATIO = 0.2
 
 
 class Notes:
-    """What a subscriber noted: times of reception and of sending, in nanoseconds."""
+    """A subscriber's notes: times of reception and of sending, in nanoseconds."""
 
     def __init__(self) -> None:
         self.got: list[int] = []
@@ -250,12 +250,12 @@ class Bench:
             command += ["--url", url, "--seconds", str(self._seconds)]
         sending = self._start(command, ours=not hz)
         _expect_ready(sending)
-        _tell(receiving if how != "roscpp" else None)
+        _ask(receiving if how != "roscpp" else None)
         began = time.monotonic()
-        told = _tell(sending, answer=True).split()
-        sent, seconds = int(told[0]), float(told[1])
+        answer = _ask(sending, answer=True).split()
+        sent, seconds = int(answer[0]), float(answer[1])
         time.sleep(0.3)
-        figures: dict[str, Any] = json.loads(_tell(receiving, answer=True))
+        figures: dict[str, Any] = json.loads(_ask(receiving, answer=True))
         if "cpu_s" in figures:
             figures["cpu"] = figures.pop("cpu_s") / (time.monotonic() - began)
         for process in (receiving, sending):
@@ -294,7 +294,7 @@ def _expect_ready(process: subprocess.Popen[str]) -> None:
             sys.exit(f"{process.args} ended before it was ready")
 
 
-def _tell(process: subprocess.Popen[str] | None, answer: bool = False) -> str:
+def _ask(process: subprocess.Popen[str] | None, answer: bool = False) -> str:
     if process is None:
         return ""
     assert process.stdin is not None
@@ -347,7 +347,7 @@ def run(bench: Bench, only: str) -> tuple[dict[str, Any], list[str]]:
         if ratio < limit:
             missed.append(f"{title}: {ratio:.2f} of rospy's rate, at least {limit}")
     if "unread" in only:
-        print("1 kHz of PoseStamped that nobody reads, share of one core", flush=True)
+        print("1 kHz of unread PoseStamped, share of one core", flush=True)
         ways = ("rospy unread", "unread")
         found = results["unread"] = bench.usual("pose", 1000, ways, "cpu", ways[0])
         ratio, spread = found["unread"]["ratio"], found["unread"]["spread"]

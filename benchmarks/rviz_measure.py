@@ -1,4 +1,4 @@
-"""What an RViz with overlays costs: for the benchmarks of rosglass.rviz, in RViz's own process.
+"""Measures an RViz with overlays for the benchmarks of rosglass.rviz, in RViz's own process.
 
 A measured process gets its orders as JSON in its arguments and prints its figures as JSON.
 """
@@ -36,8 +36,8 @@ def memory(pid: int | str = "self", *, own: bool = False) -> float:
         pid: The process.
         own: What it has written itself alone: without the code of libraries, for instance.
     """
-    told = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii")
-    return int(told.split("Private_Dirty:" if own else "Rss:")[1].split()[0]) / 1024
+    sizes = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii")
+    return int(sizes.split("Private_Dirty:" if own else "Rss:")[1].split()[0]) / 1024
 
 
 def processor(seconds: float, run: Callable[[float], None]) -> float:

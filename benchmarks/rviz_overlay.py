@@ -10,8 +10,8 @@ and four numbers move all the time.
 
 Frame rates and CPU: one RViz has no overlay, a static and an animated one by turns, forwards and
 backwards, for processes that start one after the other differ by more than an overlay costs. Each
-figure is set against that without overlay of the same turn; told is the median of these ratios,
-and how far its middle half reaches. CPU is that of the process at RViz's 30 frames per second, of
+figure is divided by that without overlay of the same turn; printed are the median of these ratios,
+and their middle half. CPU is that of the process at RViz's 30 frames per second, of
 one core. Uncapped frame rates are those of RViz drawing as fast as it can. The C++ reference's
 figures were measured on the same kind of machine (hector_rviz_overlay, QML, 1280x800, llvmpipe),
 and hold as ratios only.
@@ -23,9 +23,9 @@ pixels are memory of the process. Memory is what is resident; `own` is what the 
 written, so without the code of libraries.
 
 At last, in one RViz, overlays come, change and go again and again, 1000 times in each of the ways
-that there are (`rviz_cycles.qml` uses everything that an interface can have of RViz). What is told
-is what is held afterwards and was not after the first hundred times; malloc and JavaScript are
-asked to give back what they keep for later. Exits 1 when a target is missed.
+that there are (`rviz_cycles.qml` uses everything that an interface can have of RViz). Printed is
+what is held afterwards but was not after the first hundred times; malloc and JavaScript are asked
+to give back what they keep for later. Exits 1 when a target is missed.
 """
 
 from __future__ import annotations
@@ -183,7 +183,7 @@ def report(
             listed = "   ".join(f"{name} {value:.2f}" for name, value in parts.items())
             print(f"{what:9} ms per drawn frame: {listed}")
     print(f"\n{'':52} {'figures':>24}  {'ratio':>8}  target")
-    told = Verdicts()
+    verdicts = Verdicts()
     for name, what, figure, unit, target, least in (
         ("uncapped frame rate", "static", "fps", "", 0.88, True),
         ("uncapped frame rate", "animated", "fps", "", 0.55, True),
@@ -196,10 +196,11 @@ def report(
         )
         used, without = median(turns, what, figure), median(turns, "without", figure)
         figures = f"{used:.0f} of {without:.0f}{unit}, {low:.2f}..{high:.2f}"
-        told.line(f"{what}: {name}", figures, statistics.median(ratios), target, least)
+        verdicts.line(f"{what}: {name}", figures, statistics.median(ratios), target, least)
     later = [r["later"] for r in rounds["static"]]
     figures = f"{min(later):.2f}..{max(later):.2f} s"
-    told.line("visible after RViz's first frame", figures, statistics.median(later), 0.2, False)
+    seconds = statistics.median(later)
+    verdicts.line("visible after RViz's first frame", figures, seconds, 0.2, False)
     for kind, figure, rviz_alone in (
         ("MiB", "memory", alone_all),
         ("own MiB", "own", alone_own),
@@ -207,24 +208,24 @@ def report(
         used, without = median(rounds, "static", figure), median(rounds, "without", figure)
         for name, than in (("RViz here", without), ("RViz alone", rviz_alone)):
             more = f"{used:.0f} - {than:.0f}"
-            told.line(f"{kind} more than {name}", more, used - than, 60, False)
+            verdicts.line(f"{kind} more than {name}", more, used - than, 60, False)
     print(
         "C++: static 0.65 of the frame rate and 1.5 of the CPU, animated 0.43 of the frame rate; "
         "52 MiB more"
     )
-    return told
+    return verdicts
 
 
-def endurance(found: dict[str, dict[str, float]], count: int, told: Verdicts) -> None:
+def endurance(found: dict[str, dict[str, float]], count: int, verdicts: Verdicts) -> None:
     """Print what is left after each kind of change was made again and again."""
     # Mesa's software OpenGL keeps 6 KB of each window that is made larger or smaller.
     mesa = found["window resized, nothing shown"]["memory"]
     for name, left in found.items():
         more = left["memory"] - (mesa if name.startswith("window resized") else 0)
         figure = f"{left['objects']:+.0f} objects, {left['ms']:.0f} ms"
-        told.line(f"MiB after {count} x {name}", figure, more, 2, False)
+        verdicts.line(f"MiB after {count} x {name}", figure, more, 2, False)
         if left["files"] > 0 or left["threads"] > 0:
-            told.missed += 1
+            verdicts.missed += 1
             print(f"    {left['files']:+.0f} files, {left['threads']:+.0f} threads: MISSED")
     print(f"    {mesa:.1f} MiB of which without overlay, by RViz and OpenGL alone")
 
@@ -265,11 +266,11 @@ def main() -> int:
         order = {"what": "turns", "seconds": args.seconds}
         order |= {"turns": args.turns, "contenders": CONTENDERS}
         turns = ask(env, 120 + 10 * (args.turns + 1) * (args.seconds + 1), **order, **chosen)
-        told = report(turns, rounds, rviz)
+        verdicts = report(turns, rounds, rviz)
         if args.cycles:
             order = {"what": "cycles", "cycles": args.cycles, "warm_up": min(args.cycles, 100)}
-            endurance(ask(env, 300 + 3 * args.cycles, **order), args.cycles, told)
-    return int(told.missed > 0)
+            endurance(ask(env, 300 + 3 * args.cycles, **order), args.cycles, verdicts)
+    return int(verdicts.missed > 0)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The eleven sample messages of the codec benchmark, and accessors generated for each library.
 
-Sizes are those of the figures that we compare with: a 1920x1080 picture, a cloud of 65,536
+Sizes are those of the figures that we compare with: a 1920x1080 image, a cloud of 65,536
 points, 30 joints, 50 transforms, 100 markers of 10 points, a 1000x1000 map, 1000 poses, 20 times
 10 diagnostic values, a scan of 1080 rays.
 """

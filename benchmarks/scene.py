@@ -53,7 +53,7 @@ PEERS = str(Path(__file__).with_name("scene_peers.py"))
 RVIZ_PYTHON = ROOT / ".venv-system/bin/python"
 HEADER = {"frame_id": "map"}
 TRIANGLES_AROUND = 160
-#: Of a robot.
+#: Links of a robot.
 LINKS = 60
 _TF = "tf2_msgs/TFMessage"
 #: Seconds in which a config and its data are shown.
@@ -270,7 +270,7 @@ def joint_transforms(angle: float) -> dict[str, Any]:
 
 
 class Robot:
-    """Publishes the data, in this process: its CPU is nobody's figure."""
+    """Publishes the data, in this process, whose CPU is not measured."""
 
     def __init__(self, master: str, folder: Path) -> None:
         port = master.rpartition(":")[2]
@@ -402,7 +402,7 @@ def picks(view: Peer, among: str, verdicts: Verdicts) -> None:
     verdicts.line(f"pick among {among}: ms", figure, ours["ms"], 10, False)
     ours = view("click", times=20)
     figure = f"{ours['clicks']} clicks, the camera moves"
-    verdicts.line("the same: pictures until the answer", figure, ours["pictures"], 2, False)
+    verdicts.line("the same: frames until the answer", figure, ours["pictures"], 2, False)
 
 
 def moving(bench: Bench) -> None:

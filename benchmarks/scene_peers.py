@@ -23,7 +23,7 @@ VIEW = (1280, 800)
 _ROBOT_TIMEOUT_S = 60
 #: Degrees that the camera turns with each frame.
 _STEP_RAD = 0.02
-#: What is above the 3D view.
+#: The interface above the 3D view.
 _QML = """
 import QtQuick
 import RosScene 1.0
@@ -236,12 +236,12 @@ class Frames:
 
     Args:
         window: The window.
-        drawn: Returns how many pictures of the 3D view were drawn.
+        drawn: Returns how many frames of the 3D view were drawn.
     """
 
     def __init__(self, window: Any, drawn: Callable[[], int]) -> None:
         self._drawn, self._before, self._since = drawn, 0, 0.0
-        #: Seconds of each frame, with and without a new picture of the 3D view.
+        #: Seconds of each frame, with and without a new frame of the 3D view.
         self.seconds: dict[bool, list[float]] = {True: [], False: []}
         window.afterAnimating.connect(self._begin)
         window.frameSwapped.connect(self._end)
@@ -410,7 +410,7 @@ class View:
         return {"ms": statistics.median(took), "longest": max(took), "hits": hits}
 
     def click(self, times: int) -> dict[str, float]:
-        """Click while the camera moves; return pictures until a tool has what was clicked."""
+        """Click while the camera moves; return the frames until a tool has the clicked point."""
         from PySide6.QtCore import QEvent, QPointF, Qt
         from PySide6.QtGui import QMouseEvent
 

@@ -37,7 +37,7 @@ REQUEST = {"a": 1, "b": 2}
 RATIO = 1.5
 #: Calls before a turn is measured, and the pause between calls in seconds.
 WARM, PAUSE = 20, 0.001
-#: What ends when nothing refers to it.
+#: Keeps objects that end when nothing refers to them.
 _kept: list[Any] = []
 
 

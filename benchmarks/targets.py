@@ -1,4 +1,4 @@
-"""What the codec has to reach, and what the C++ library reaches elsewhere.
+"""The targets of the codec, and the figures of the C++ library elsewhere.
 
 The absolute figures were set on an idle 2-core AMD EPYC with Python 3.11; the ratios to a named
 peer in the same run are what can be held against any machine.
@@ -14,7 +14,7 @@ BIG_ARRAYS = ("Image", "PointCloud2", "OccupancyGrid")
 
 @dataclass(frozen=True)
 class Target:
-    """What one figure should reach.
+    """The target of one figure.
 
     Attributes:
         limit: Highest value on the reference machine (us, or bytes for memory), None if not set.

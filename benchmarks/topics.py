@@ -5,7 +5,7 @@
 Publisher, subscriber and router are three processes on the loopback interface. "bare" puts and
 receives the same bytes on the same key with the package zenoh; "raw" is publish_serialized() and a
 raw callback; "message" is publish() of a message and a callback that reads one field, on the node's
-dispatcher; "native" is a zenoh subscriber whose samples nobody ever takes: Zenoh's own share.
+dispatcher; "native" is a zenoh subscriber whose samples are never taken: Zenoh's own share.
 "dora" and "sdk" are the subscriptions of dora-rs and zenoh-ros2-sdk to our publisher. A latency
 starts before the publisher's call and ends when the bytes, or the message, are in the callback's
 hands.
@@ -36,13 +36,13 @@ TOPIC = peers.TOPIC
 _FIRST = 5
 #: Seconds before a CPU share is measured: a reader chooses its way of receiving once a second.
 _SETTLE = 3.0
-#: At most so much slower than bare zenoh: ratio of medians of small samples, and of pictures.
-LATENCY_RATIO, PICTURE_RATIO = 1.3, 1.2
-#: Median for a picture of 6.2 MB through shared memory, in milliseconds.
+#: Maximum ratio to bare zenoh of the medians of small samples, and of images.
+LATENCY_RATIO, IMAGE_RATIO = 1.3, 1.2
+#: Median for an image of 6.2 MB through shared memory, in milliseconds.
 SHARED_MS = 3.0
 #: At least this part of bare zenoh's rate of small samples.
 RATE_RATIO = 0.8
-#: At most this share of a core for 1 kHz of PoseStamped that nobody reads ...
+#: Maximum share of a core for 1 kHz of unread PoseStamped ...
 UNREAD_CPU = 0.03
 #: ... or, where Zenoh alone takes as much already, so much more than that.
 UNREAD_EXTRA = 0.02
@@ -50,14 +50,14 @@ UNREAD_EXTRA = 0.02
 
 @dataclass(frozen=True)
 class Case:
-    """What is measured.
+    """A measurement.
 
     Attributes:
         name: For people.
         type: Message type.
         hz: Rate of publishing, 0 for as fast as possible.
         ways: How to publish and to receive, of each way.
-        size: Width and height of pictures.
+        size: Width and height of images.
         shm: Whether shared memory is allowed.
         measures: ``latency``, ``rate`` or ``unread``.
     """
@@ -90,7 +90,7 @@ CASES = (
     ),
     Case("64 B back to back", STRING, 0, _alike("bare", "raw"), measures="rate"),
     Case(
-        "1 kHz of PoseStamped that nobody reads",
+        "1 kHz of unread PoseStamped",
         POSE,
         1000,
         {"native": ("bare", "native"), "bare": ("bare", "bare"), "ours": ("bare", "unread")},
@@ -119,7 +119,7 @@ def connect(plan: dict[str, Any], name: str) -> Any:
 
 
 class Notes:
-    """What a subscriber noted: times of reception and of sending, in nanoseconds."""
+    """A subscriber's notes: times of reception and of sending, in nanoseconds."""
 
     def __init__(self) -> None:
         self.got: list[int] = []
@@ -318,7 +318,7 @@ def judge(case: Case, found: dict[str, Any]) -> list[str]:
         if found["raw"]["median"] > SHARED_MS:
             missed.append(f"{case.name}: {found['raw']['median']:.2f} ms, at most {SHARED_MS} ms")
     elif "bare" in found:
-        limit = LATENCY_RATIO if case.type == STRING else PICTURE_RATIO
+        limit = LATENCY_RATIO if case.type == STRING else IMAGE_RATIO
         ratio = found["raw"]["median"] / base["median"]
         if ratio > limit:
             missed.append(f"{case.name}: {ratio:.2f} times bare zenoh's latency, at most {limit}")

@@ -84,7 +84,7 @@ def stamp_of(header: Any) -> int:
 
 
 def dora_subscriber(plan: Plan, note: Callable[[int], None]) -> Any:
-    """Poll dora's subscription, its only way, and read the stamp of each picture."""
+    """Poll dora's subscription, its only way, and read the stamp of each image."""
     import dora
 
     config = {
@@ -118,7 +118,7 @@ def dora_subscriber(plan: Plan, note: Callable[[int], None]) -> Any:
 
 
 def sdk_subscriber(plan: Plan, note: Callable[[int], None]) -> Any:
-    """Let zenoh-ros2-sdk call back with decoded pictures."""
+    """Let zenoh-ros2-sdk call back with decoded images."""
     from zenoh_ros2_sdk import message_registry
     from zenoh_ros2_sdk.subscriber import ROS2Subscriber
 
@@ -132,7 +132,7 @@ def sdk_subscriber(plan: Plan, note: Callable[[int], None]) -> Any:
 
 
 def interfaces(folder: Path) -> Path:
-    """Write the definitions of a picture, as ROS installs them."""
+    """Write the definitions of an image, as ROS installs them."""
     from rosglass.interfaces import Definition, Library, rihs01, type_description
 
     library = Library()
