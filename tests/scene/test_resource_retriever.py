@@ -107,7 +107,7 @@ def raw(*lines: bytes) -> Callable[[BaseHTTPRequestHandler], None]:
     [
         (None, "the server answers 404 Not Found"),
         (redirect("file:///etc/passwd"), "file:///etc/passwd"),
-        (redirect("ftp://127.0.0.1/a.stl"), "which is no web server"),
+        (redirect("ftp://127.0.0.1/a.stl"), "which is not a web server"),
         (redirect("/a.stl"), "redirect"),
         (raw(b"HTTP/1.0 200 OK", b"Content-Length: 99", b"", b"short"), "sent 5 of 99 bytes"),
         (raw(b"HTTP/1.0 200 OK", b"Content-Length: x", b"", b"short"), "cannot be fetched"),

@@ -143,8 +143,8 @@ def test_text_stl() -> None:
     assert corners(one(text.upper().encode(), "a.stl")) == TRIANGLE
     for broken, message in (
         (text.replace("   vertex 0 0 0\n", ""), "too few vertices"),
-        (text.replace("2.0 0", "two 0"), "no numbers"),
-        (text.replace("   vertex 0 0 0", "vertex 0"), "too few vertices|no numbers"),
+        (text.replace("2.0 0", "two 0"), "not three numbers"),
+        (text.replace("   vertex 0 0 0", "vertex 0"), "too few vertices|not three numbers"),
         ("solid empty\nfacet\nendsolid\n", "no triangles"),
     ):
         with pytest.raises(MeshError, match=rf"a\.stl: .*({message})"):
@@ -640,8 +640,8 @@ def test_glb_is_turned_to_z_up() -> None:
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"nodes": [{"children": [0]}]}, "the nodes are no tree"),
-        ({"nodes": [{"children": [1, 1]}, {"mesh": 0}]}, "the nodes are no tree"),
+        ({"nodes": [{"children": [0]}]}, "the nodes do not form a tree"),
+        ({"nodes": [{"children": [1, 1]}, {"mesh": 0}]}, "the nodes do not form a tree"),
         ({"accessors": [{"count": 1 << 40, "componentType": 5126, "type": "VEC3"}]}, "accessor 0"),
         ({"accessors": [{"count": -1, "bufferView": 0}]}, "accessor 0"),
         ({"accessors": [{"count": 1, "bufferView": 9}]}, "corrupt"),
@@ -724,9 +724,9 @@ def test_unknown_formats(name: str) -> None:
 def test_missing_and_special_files_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match=r"a\.stl: the mesh can't be read: .*No such file"):
         load_mesh(tmp_path / "a.stl")
-    with pytest.raises(MeshError, match="this is no file"):
+    with pytest.raises(MeshError, match="this is not a file"):
         load_mesh(tmp_path)
-    with pytest.raises(MeshError, match="this is no file"):
+    with pytest.raises(MeshError, match="this is not a file"):
         load_mesh("/dev/zero", "a.stl")
     with pytest.raises(ArgumentError, match=r"name: expected name of the mesh file"):
         load_mesh(b"data")

@@ -55,14 +55,14 @@ def test_resources_are_found_by_uri_and_path(
             ResourceError,
             r"^package://my_arm/meshes/upper_arm.stl: there is no such file; did you mean",
         ),
-        ("package://my_arm/meshes", ResourceError, r"this is no file"),
+        ("package://my_arm/meshes", ResourceError, r"this is not a file"),
         ("a.stl", ResourceError, r"the path is relative; use package://"),
         ("file://robot/a.stl", ResourceError, r"'robot' is another machine"),
         ("http://x.org/a.stl", UnsupportedError, r"not loaded from web servers; download it"),
         ("HTTPS://x.org/a.stl", UnsupportedError, r"not loaded from web servers"),
         ("model://robot/a.stl", UnsupportedError, r"model: is not supported; use package://"),
         ("/a\0b.stl", ResourceError, r"null"),
-        ("/dev/zero", ResourceError, r"/dev/zero: this is no file"),
+        ("/dev/zero", ResourceError, r"/dev/zero: this is not a file"),
         ("/" + "x" * 5000, ResourceError, r"."),
         ("", ArgumentError, r"uri: expected package://name/path, file:///path or a path"),
         (5, ArgumentError, r"uri: expected"),
@@ -127,7 +127,7 @@ def test_sizes_of_pictures(picture, tmp_path: Path) -> None:  # type: ignore[no-
 
 @pytest.mark.parametrize("size", [(20_000, 20_000), (20_000, 1), (16_384, 16_384), (0, 5)])
 def test_pictures_that_are_too_large(size: tuple[int, int]) -> None:
-    message = rf"wood.png: the picture is {size[0]}x{size[1]} pixels; the limits are .*; reduce it"
+    message = rf"wood.png: the image is {size[0]}x{size[1]} pixels; the limits are .*; reduce it"
     for picture in (png(*size), size):
         with pytest.raises(ResourceError, match=message):
             check_texture(picture, "wood.png")
@@ -135,11 +135,11 @@ def test_pictures_that_are_too_large(size: tuple[int, int]) -> None:
 
 
 def test_invalid_texture_is_rejected(tmp_path: Path) -> None:
-    with pytest.raises(UnsupportedError, match=r"wood: this is no PNG, .*; convert it to PNG"):
+    with pytest.raises(UnsupportedError, match=r"wood: this is not a PNG, .*; convert it to PNG"):
         check_texture(b"some text that is long enough", "wood")
     with pytest.raises(ResourceError, match="there is no such file"):
         check_texture(tmp_path / "missing.png")
-    with pytest.raises(ResourceError, match="this is no file"):
+    with pytest.raises(ResourceError, match="this is not a file"):
         check_texture("/dev/zero")
     with (tmp_path / "large.png").open("wb") as file:
         file.truncate(300 << 20)

@@ -96,7 +96,7 @@ def cloud_from_point_cloud(message: Any) -> Cloud:
     Channels with another number of values than points are left out, with a warning.
 
     Raises:
-        DecodeError: It is no PointCloud, or has values other than numbers.
+        DecodeError: The message is not a PointCloud, or has values other than numbers.
     """
     points = read_sequence(message, _CLOUD, "points")
     columns: dict[str, Any] = {}
@@ -140,7 +140,7 @@ def cloud_from_laser_scan(
         end: Pose of the scanner at the last ray.
 
     Raises:
-        DecodeError: It is no LaserScan, or its angles or limits are no numbers.
+        DecodeError: The message is not a LaserScan, or its angles or limits are not numbers.
     """
     ranges = _numbers(read_field(scan, _SCAN, "ranges"), _SCAN, "ranges")
     intensities = _numbers(read_field(scan, _SCAN, "intensities"), _SCAN, "intensities")
@@ -226,8 +226,8 @@ class _DepthPixels(NamedTuple):
 
     Attributes:
         values: x, y, z and the packed color of each, float32.
-        known: Their numbers in the image, row by row.
-        camera: Size of the image and its projection: what tells one camera from another.
+        known: Their indices in the image, row by row.
+        camera: Size of the image and its projection, which identify the camera.
     """
 
     values: NDArray[np.float32]
@@ -273,7 +273,7 @@ _OCCLUSION_DISTANCE_M = 0.01
 
 
 class OcclusionBuffer:
-    """What a depth camera that stands still has seen behind the nearer objects of its images.
+    """Points that a resting depth camera has seen behind the nearer objects of its images.
 
     Its points are those that RViz's Occlusion Compensation adds: for each pixel, the last one that
     nothing nearer has hidden since, at half the brightness. Used in any thread.

@@ -127,7 +127,7 @@ class _Collada:
         except ValueError:
             unit = math.nan
         if not 0 < unit < 1e9:
-            _log.warning("%s: <unit meter=%r> is no length; metres are used", self._name, text)
+            _log.warning("%s: <unit meter=%r> is not a length; metres are used", self._name, text)
             return 1.0
         return unit
 
@@ -351,7 +351,7 @@ class _Collada:
         for channel in ("diffuse", "emission"):
             sampler = shading.find(f"{channel}/texture")
             if sampler is not None:
-                texture = self._picture(effect, sampler.get("texture", ""))
+                texture = self._image_path(effect, sampler.get("texture", ""))
                 if texture is not None:
                     return (1.0, 1.0, 1.0, alpha), texture
             color = shading.find(f"{channel}/color")
@@ -382,8 +382,8 @@ class _Collada:
             a = 0.212671 * r + 0.715160 * g + 0.072169 * b
         return 1.0 - a * factor if mode.endswith("ZERO") and color is not None else a * factor
 
-    def _picture(self, effect: Element, sampler: str) -> str | None:
-        """Return the path of the picture of a sampler, or of an image by its id."""
+    def _image_path(self, effect: Element, sampler: str) -> str | None:
+        """Return the path of a sampler's image file, or of an image by its id."""
         parameters = {found.get("sid"): found for found in effect.iter("newparam")}
         key = sampler
         for _ in range(3):  # sampler, surface, image
@@ -400,7 +400,7 @@ class _Collada:
             source = image.find("init_from")
         text = "" if source is None else source.text or ""
         if not text.strip():
-            _log.warning("%s: texture %r has no picture", self._name, sampler)
+            _log.warning("%s: texture %r has no image", self._name, sampler)
             return None
         return relative(self._base, unquote(text))
 
@@ -425,7 +425,7 @@ def _by_id(root: Element) -> dict[tuple[str, str], Element]:
     """Return the elements with an id by tag and id, the first of each."""
     found: dict[tuple[str, str], Element] = {}
     for element in root.iter():
-        if "id" in element.keys():  # noqa: SIM118 - an Element is no dict
+        if "id" in element.keys():  # noqa: SIM118 - an Element is not a dict
             found.setdefault((element.tag, element.get("id", "")), element)
     return found
 

@@ -71,9 +71,9 @@ __all__ = [
     "read_resource",
 ]
 
-#: As large as an STL file with that many triangles.
+#: Size of an STL file with the maximum number of triangles.
 _MAX_FILE_BYTES = 512 << 20
-#: Of glTF.
+#: Nodes of a glTF file.
 _MAX_NODES = 100_000
 _QUANTISED = "quantised glTF is not read; save it with floats (gltf-transform dequantize)"
 
@@ -178,12 +178,12 @@ def read_mesh_file(path: str, name: str) -> bytes:
     """Return the bytes of a mesh file.
 
     Raises:
-        MeshError: It is no file, too large, or can't be read.
+        MeshError: The path is not a file, the file is too large, or can't be read.
     """
     try:
         about = Path(path).stat()
         if not stat.S_ISREG(about.st_mode):
-            raise MeshError(f"{name}: this is no file")
+            raise MeshError(f"{name}: this is not a file")
         if about.st_size > _MAX_FILE_BYTES:
             raise MeshError(f"{name}: {about.st_size} bytes; the limit is {_MAX_FILE_BYTES}")
         with Path(path).open("rb") as file:
@@ -228,7 +228,7 @@ def _file_beside(
 
 # -- the cache -----------------------------------------------------------------------------------
 
-#: Of the files: counts changes of what the readers make.
+#: Version of the cached files, raised when the readers' results change.
 _CACHE_VERSION = 2
 _MAX_CACHE_BYTES = 512 << 20
 #: Files of materials that an OBJ file can name.
@@ -267,7 +267,7 @@ class _Cache:
         except FileNotFoundError:
             return None
         except Exception as error:  # of numpy and zipfile, for any content
-            _log.warning("%s is no cached mesh and is removed: %s", path, error)
+            _log.warning("%s is not a cached mesh and is removed: %s", path, error)
             with suppress(OSError):
                 path.unlink()
             return None
@@ -363,7 +363,7 @@ def _read_text_stl(data: bytes, name: str) -> MeshPart:
     try:
         positions = np.array(words).astype(np.float32).reshape(-1, 3)
     except ValueError as error:
-        raise MeshError(f"{name}: a vertex of the STL file is no numbers: {error}") from None
+        raise MeshError(f"{name}: a vertex of the STL file is not three numbers: {error}") from None
     return flat_part(positions)
 
 
@@ -505,7 +505,7 @@ class _Obj:
                     else:
                         a = values[0] if key == "d" else 1.0 - values[0]
                 except (ValueError, IndexError):
-                    _log.warning("%s: %s of material %r is no number", self._name, key, material)
+                    _log.warning("%s: %s of material %r is not a number", self._name, key, material)
                 self._materials[material] = ((r, g, b, a), texture)
             elif material is not None and key == "map_Kd":
                 color, _ = self._materials[material]
@@ -599,7 +599,7 @@ def _trimesh_material(material: Any, name: str) -> tuple[Color | None, bytes | N
         image.save(file, "PNG", compress_level=1)
     except Error:
         raise
-    except Exception as error:  # of pillow, for a corrupt picture
+    except Exception as error:  # of pillow, for a corrupt image
         _log.warning("%s: a texture can't be read: %s", name, error)
         return color, None  # type: ignore[return-value]
     return color, file.getvalue()  # type: ignore[return-value]
@@ -639,7 +639,7 @@ def _check_gltf(data: bytes, name: str) -> bool:
         children = [child for node in nodes for child in node.get("children", ())]
         roots = [root for scene in about.get("scenes", ()) for root in scene.get("nodes", ())]
         if len(nodes) > _MAX_NODES or len(set(children + roots)) < len(children) + len(roots):
-            raise MeshError(f"{name}: the nodes are no tree, or more than {_MAX_NODES}")
+            raise MeshError(f"{name}: the nodes do not form a tree, or are more than {_MAX_NODES}")
         views = about.get("bufferViews", [])
         for index, accessor in enumerate(about.get("accessors", ())):
             view = accessor.get("bufferView")

@@ -100,7 +100,7 @@ def read_integer(message: Any, type_name: str, name: str, path: str = "") -> int
         path: Path of the message in the whole, with a final dot.
 
     Raises:
-        DecodeError: It has no such field, or the value is none.
+        DecodeError: The field is missing, or its value is invalid.
     """
     value = read_field(message, type_name, name)
     try:
@@ -117,7 +117,7 @@ def read_sequence(message: Any, type_name: str, name: str) -> Any:
     """Return a field that is an array.
 
     Raises:
-        DecodeError: It has no such field, or the value is none.
+        DecodeError: The field is missing, or its value is not an array.
     """
     value = read_field(message, type_name, name)
     if not hasattr(value, "__len__") or isinstance(value, (str, Mapping)):
@@ -155,12 +155,12 @@ class CloudField:
 
     @property
     def is_known(self) -> bool:
-        """Whether the type code is one of PointField's."""
+        """True if the type code is one of PointField's."""
         return self.datatype in _DATATYPES
 
     @property
     def is_packed_color(self) -> bool:
-        """Whether the value has 4 bytes, as those of rgb and rgba have."""
+        """True if the value has 4 bytes, as those of rgb and rgba do."""
         return self.datatype in {INT32, UINT32, FLOAT32} and self.count == 1
 
     def dtype(self, is_bigendian: bool = False) -> np.dtype[Any]:
@@ -250,7 +250,7 @@ class CloudLayout:
 
     @property
     def is_packed(self) -> bool:
-        """Whether rows follow each other without padding."""
+        """True if rows follow each other without padding."""
         return self.height == 1 or self.row_step == self.width * self.point_step
 
     @property
@@ -276,7 +276,7 @@ class CloudLayout:
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """What a vertex has besides its position.
+    """A value of each vertex besides its position.
 
     Attributes:
         fields: The field, or three whose values from 0 to 1 are red, green and blue.
@@ -362,7 +362,8 @@ class Cloud:
         As in RViz, a row_step that does not fit is ignored if the data has no padding.
 
         Raises:
-            DecodeError: Sizes, fields and data are inconsistent, or it is no PointCloud2.
+            DecodeError: Sizes, fields and data are inconsistent, or the message is not a
+                PointCloud2.
         """
         width, height, point_step, row_step = (
             read_integer(message, _CLOUD2, name)
@@ -450,7 +451,7 @@ class Cloud:
 
     @property
     def finite_mask(self) -> NDArray[np.bool_] | None:
-        """Whether each point has a finite position; None if all have."""
+        """A mask of the points with a finite position; None if all have one."""
         return self._extent[0]
 
     def bounds(self) -> Bounds | None:
@@ -551,7 +552,7 @@ class Cloud:
         """Return a channel that is a color, as points x (blue, green, red, alpha).
 
         Raises:
-            ArgumentError: The cloud does not have the channel's fields, or they are no colors.
+            ArgumentError: The cloud lacks the channel's fields, or they are not colors.
         """
         names = channel.fields
         if len(names) == 1:
@@ -649,7 +650,7 @@ def to_unorm(values: Array) -> NDArray[np.uint8]:
 
 
 def is_ordered(cloud: Cloud) -> bool:
-    """Whether successive points are close to each other, as in lidar rows and depth images.
+    """Return whether successive points are close to each other, as in lidar rows and depth images.
 
     Decided by about a thousand points.
     """
@@ -849,7 +850,7 @@ def check_finite(name: str, value: Any) -> None:
     """Check a number.
 
     Raises:
-        ArgumentError: It is none, NaN or infinite.
+        ArgumentError: The value is not a number, NaN or infinite.
     """
     try:
         valid = math.isfinite(value)

@@ -38,7 +38,7 @@ __all__ = ["ResourceRetriever"]
 
 _log = logging.getLogger("rosglass.scene")
 
-#: Where a robot with ROS 2 Kilted serves files, and the type of that service.
+#: The service by which a robot with ROS 2 Kilted provides files, and its type.
 _SERVICE, _SERVICE_TYPE = "/rviz/get_resource", "rviz_resource_interfaces/srv/GetResource"
 #: ``status_code`` of its response.
 _OK, _NOT_MODIFIED = 1, 2
@@ -68,12 +68,12 @@ class _NotOffered(_Unanswered):
 
 
 class _Outcome(NamedTuple):
-    """What came of a URI.
+    """The result of fetching a URI.
 
     Attributes:
-        until: When to ask again, by :func:`time.monotonic`.
-        data: Its bytes; None if it could not be fetched.
-        error: Why.
+        until: Time of the next attempt, by :func:`time.monotonic`.
+        data: The bytes; None if they could not be fetched.
+        error: The reason; empty if they were fetched.
     """
 
     until: float
@@ -133,7 +133,7 @@ class _Redirects(urllib.request.HTTPRedirectHandler):
         self, req: Any, fp: Any, code: int, msg: str, headers: Any, newurl: str
     ) -> Any:
         if urlsplit(newurl).scheme not in {"http", "https"}:
-            raise ResourceError(f"the server redirects to {newurl}, which is no web server")
+            raise ResourceError(f"the server redirects to {newurl}, which is not a web server")
         return super().redirect_request(req, fp, code, msg, headers, newurl)
 
 
@@ -205,7 +205,7 @@ class ResourceRetriever:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether there are servers that have not answered."""
+        """True while servers have not answered."""
         return bool(self._unanswered)
 
     def ask_again(self) -> list[str]:
@@ -277,7 +277,7 @@ class ResourceRetriever:
             if time.monotonic() - now > _SLOW_S and not isinstance(reason, _NotOffered):
                 self._failures.append(time.monotonic())
             return _Outcome(time.monotonic() + _REMEMBER_S, None, f"{reason}{_LATER}")
-        except (Error, ValueError) as reason:  # the latter of what is no URL
+        except (Error, ValueError) as reason:  # the latter for an invalid URL
             error = _plain(reason, uri)
         self._unanswered.pop(uri, None)
         return _Outcome(time.monotonic() + _REMEMBER_S, data, error)
@@ -366,7 +366,7 @@ class ResourceRetriever:
 
     def _take(self, uri: str, service: str, response: Any) -> bytes:
         if not all(name in response for name in ("status_code", "error_reason", "etag", "body")):
-            raise ResourceError(f"the service {service} is no GetResource")
+            raise ResourceError(f"the service {service} is not of type GetResource")
         if response.status_code == _NOT_MODIFIED:
             kept = self._copies.get(uri)
             if kept is not None:

@@ -25,7 +25,7 @@ __all__ = ["ResourceError", "check_texture", "forget_packages", "locate_resource
 
 #: Longest side of a texture that graphics cards take everywhere.
 _MAX_SIDE = 16_384
-_MAX_PICTURE_BYTES = 256 << 20
+_MAX_IMAGE_BYTES = 256 << 20
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(?://)?")
 
 
@@ -116,7 +116,7 @@ def _existing(path: Path, uri: str) -> Path:
         reason = "there is no such file" if isinstance(error, FileNotFoundError) else str(error)
         raise ResourceError(f"{shown}: {reason}{hint}") from None
     if not stat.S_ISREG(mode):
-        raise ResourceError(f"{shown}: this is no file")
+        raise ResourceError(f"{shown}: this is not a file")
     return path
 
 
@@ -146,44 +146,44 @@ def make_room(folder: Path, size: int, limit: int) -> None:
 
 
 def check_texture(
-    picture: bytes | str | os.PathLike[str] | tuple[int, int], name: str = ""
+    image: bytes | str | os.PathLike[str] | tuple[int, int], name: str = ""
 ) -> tuple[int, int]:
-    """Return width and height of a picture, which is small enough to be decoded and drawn.
+    """Return width and height of an image after checking that it can be decoded and drawn.
 
     Args:
-        picture: Path or bytes of a PNG, JPEG, BMP, GIF, WebP or TGA file, or a size in pixels.
-        name: Name of the picture for errors.
+        image: Path or bytes of a PNG, JPEG, BMP, GIF, WebP or TGA file, or a size in pixels.
+        name: Name of the image for errors.
 
     Raises:
-        ResourceError: The file is missing, empty or corrupt, or the picture has more than 16,384
-            pixels along a side or 2^26 in all.
-        UnsupportedError: It is none of these formats.
+        ResourceError: The file is missing, empty or corrupt, or the image has more than 16,384
+        pixels along a side or 2^26 in all.
+        UnsupportedError: The file has none of these formats.
     """
-    if isinstance(picture, tuple):
-        width, height = picture
+    if isinstance(image, tuple):
+        width, height = image
     else:
-        if not isinstance(picture, (bytes, bytearray, memoryview)):
-            path = Path(picture)
+        if not isinstance(image, (bytes, bytearray, memoryview)):
+            path = Path(image)
             name = name or os.fspath(path)
-            picture = _read_picture(path, name)
-        width, height = _size(bytes(picture), name or "texture")
+            image = _read_image(path, name)
+        width, height = _size(bytes(image), name or "texture")
     if not 0 < width <= _MAX_SIDE or not 0 < height <= _MAX_SIDE or width * height > MAX_PIXELS:
         raise ResourceError(
-            f"{name or 'texture'}: the picture is {width}x{height} pixels; the limits are 1 to "
+            f"{name or 'texture'}: the image is {width}x{height} pixels; the limits are 1 to "
             f"{_MAX_SIDE} a side and {MAX_PIXELS} in all; reduce it"
         )
     return width, height
 
 
-def _read_picture(path: Path, name: str) -> bytes:
+def _read_image(path: Path, name: str) -> bytes:
     try:
         _existing(path, os.fspath(path))
         size = path.stat().st_size
-        if size > _MAX_PICTURE_BYTES:
-            raise ResourceError(f"{name}: {size} bytes; the limit is {_MAX_PICTURE_BYTES}")
+        if size > _MAX_IMAGE_BYTES:
+            raise ResourceError(f"{name}: {size} bytes; the limit is {_MAX_IMAGE_BYTES}")
         return path.read_bytes()
     except OSError as error:
-        raise ResourceError(f"{name}: the picture can't be read: {error}") from None
+        raise ResourceError(f"{name}: the image can't be read: {error}") from None
 
 
 def _size(data: bytes, name: str) -> tuple[int, int]:
@@ -203,13 +203,13 @@ def _size(data: bytes, name: str) -> tuple[int, int]:
         if header.kind not in {"jpeg", "png"}:
             raise UnsupportedError(header.kind)
     except struct.error:
-        raise ResourceError(f"{name}: the picture is cut off") from None
+        raise ResourceError(f"{name}: the image is cut off") from None
     except DecodeError as error:
         reason = str(error).partition(": ")[2]
         raise ResourceError(f"{name}: {reason}") from None
     except UnsupportedError:
         raise UnsupportedError(
-            f"{name}: this is no PNG, JPEG, BMP, GIF, WebP or TGA picture; convert it to PNG"
+            f"{name}: this is not a PNG, JPEG, BMP, GIF, WebP or TGA image; convert it to PNG"
         ) from None
     return header.width, header.height
 
@@ -228,7 +228,7 @@ def _webp_size(data: bytes) -> tuple[int, int]:
 
 
 def _is_tga(data: bytes) -> bool:
-    """Return whether a file, which has no signature, has the header of a TGA picture."""
+    """Return whether a file, which has no signature, has the header of a TGA image."""
     return (
         len(data) > 18
         and data[1] in {0, 1}

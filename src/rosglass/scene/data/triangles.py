@@ -62,7 +62,7 @@ class MeshPart:
         color: Red, green, blue and opacity, 0 to 1; None if the file has none. RViz draws an STL
             file in the colour of the robot description or marker, and other files without a
             material in grey (0.6).
-        texture: Path or URI of a picture, or its bytes if it is in the file; None for none.
+        texture: Path or URI of an image, or its bytes if the file contains it; None without one.
     """
 
     positions: Floats

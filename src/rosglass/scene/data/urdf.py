@@ -114,7 +114,7 @@ class Material:
     Attributes:
         name: Its name; empty for one without a name.
         color: Red, green, blue and opacity, 0 to 1.
-        texture: URI of a picture; empty for none.
+        texture: URI of an image; empty without one.
     """
 
     name: str
@@ -220,8 +220,8 @@ class Robot:
         name: The robot's name.
         links: The links by name.
         joints: The joints by name.
-        root: Name of the link that is no joint's child.
-        warnings: What is broken and was left out, each with source and line.
+        root: Name of the link that is not the child of a joint.
+        warnings: Broken elements that were left out, each with source and line.
         tree: The joints, each after the joint that moves its parent link.
     """
 
@@ -274,7 +274,8 @@ def parse_urdf(text: str | bytes, source: str = "robot_description") -> Robot:
         source: File, parameter or topic that it is from, for messages.
 
     Raises:
-        UrdfError: The text is no URDF, or its links are no tree; it names the line and the fix.
+        UrdfError: The text is not a URDF, or its links do not form a tree; the error names the line
+            and the fix.
         ArgumentError: The text is neither a string nor bytes.
     """
     if not isinstance(text, (str, bytes)):
@@ -298,7 +299,7 @@ class _Broken(Exception):  # noqa: N818 - never leaves this file
 class _Parser:
     def __init__(self, source: str, warnings: list[str]) -> None:
         self._source, self._warnings = source, warnings
-        #: What to do about tags of xacro, for errors that they may have caused.
+        #: Advice about tags of xacro, for errors that they may have caused.
         self._hint = ""
         self._materials: dict[str, Material] = {}
         #: The elements of links and joints by name.
@@ -714,7 +715,7 @@ def _origin(element: XmlElement) -> Matrix:
     if origin is None:
         return matrix
     matrix[:3, 3] = _numbers(origin, "xyz", 3, (0.0, 0.0, 0.0))
-    if "quat_xyzw" in origin.keys():  # noqa: SIM118 - an Element is no dict; URDF 1.2
+    if "quat_xyzw" in origin.keys():  # noqa: SIM118 - an Element is not a dict; URDF 1.2
         x, y, z, w = _numbers(origin, "quat_xyzw", 4)
         length = math.hypot(x, y, z, w)
         if not length:
