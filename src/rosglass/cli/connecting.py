@@ -188,12 +188,20 @@ def wait(node: Node, look: Callable[[], _T], timeout: float) -> _T:
             changed.clear()
 
 
-def find(node: Node, look: Callable[[], _T], timeout: float) -> _T:
+def find(node: Node, look: Callable[[], _T], timeout: float, *, whole: bool = True) -> _T:
     """Wait until the graph is complete, and return the result of `look`.
 
     Waits less for a missing name than for a robot that has not answered yet.
+
+    Args:
+        node: Node in the graph.
+        look: Called after each change of the graph.
+        timeout: Seconds.
+        whole: False to return the first true result, without waiting for the rest of the graph.
     """
-    wait(node, look, min(timeout, _DISCOVERY_S if _QUIET_S[node.url.partition(":")[0]] else 0.0))
+    within = min(timeout, _DISCOVERY_S if _QUIET_S[node.url.partition(":")[0]] else 0.0)
+    if (found := wait(node, look, within)) and not whole:
+        return found
     await_graph(node)
     return look()
 

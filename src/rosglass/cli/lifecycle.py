@@ -107,7 +107,11 @@ def _connect(args: argparse.Namespace) -> Node:
 def _client(node: Node, args: argparse.Namespace) -> LifecycleClient:
     """Return a client of the named node; raises Error for one that is not a lifecycle node."""
     args.node = "/" + args.node.lstrip("/")
-    if not find(node, lambda: args.node + _SERVICE in node.services(), args.timeout):
+
+    def is_here() -> bool:
+        return args.node + _SERVICE in node.services()
+
+    if not find(node, is_here, args.timeout, whole=False):
         names = _names(node.services(), include_hidden=True)
         known = f"; lifecycle nodes are: {', '.join(names)}" if names else ""
         raise Error(f"{args.node} is not a lifecycle node here{known}")
