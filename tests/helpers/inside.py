@@ -25,7 +25,7 @@ def queue_of(display: Any) -> Any:
 
 def renderers_of(view: Any) -> list[Any]:
     """Return what draws a 3D view: one for each window that it is in."""
-    return list(view._renderers)
+    return list(view._frames.renderers)
 
 
 def device_of(renderer: Any) -> Any:

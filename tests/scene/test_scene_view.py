@@ -1101,9 +1101,9 @@ def test_the_first_frame_may_be_announced_with_further_ones(bench: SceneBench) -
     bench.wait(lambda: view.acceptedMouseButtons() == Qt.MouseButton.AllButtons)
     bench.wait.nothing_happens(0.1)
     # The view still follows the frames of its window, by which it leaves time to QML.
-    began = view._frame_began
+    began = view._frames.began
     view.update()
-    bench.wait(lambda: view._frame_began > began)
+    bench.wait(lambda: view._frames.began > began)
 
 
 def test_the_whole_is_drawn_after_a_move_whose_timer_ends_early(
@@ -1144,7 +1144,7 @@ def test_what_is_new_is_uploaded_over_several_pictures(
 
     view = bench.load()
     bench.picture()
-    (renderer,) = view._renderers
+    (renderer,) = view._frames.renderers
     shown: list[tuple[int, bool]] = []
     prepare = renderer._prepare
 
@@ -1245,7 +1245,7 @@ def test_texts_that_are_taken_away_meanwhile_hide_nothing(
         frame = take()
         if labels.count:
             # Another thread draws then, or the next frame waits, for QML is to have its time.
-            view._next_picture = time.monotonic() + 60
+            view._frames.next_picture = time.monotonic() + 60
             labels.set_texts([], [])
         return frame
 

@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 import logging
-import math
 import time
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from PySide6.QtGui import QColor, QEventPoint, QGuiApplication
-from PySide6.QtQuick import QQuickRhiItem, QQuickWindow, QSGRendererInterface
-from shiboken6 import Shiboken
+from PySide6.QtGui import QColor
+from PySide6.QtQuick import QQuickRhiItem
 
 from rosglass.errors import ArgumentError, Error, shown
 from rosglass.overlay.orbit import ease
@@ -28,7 +26,7 @@ from rosglass.scene.render.picking import pick
 from rosglass.scene.render.renderer import Frame, SceneRenderer
 from rosglass.scene.render.scene_tree import Group
 from rosglass.scene.tools.selection import Selection
-from rosglass.scene.tools.tool import PointerEvent, Tool, Tools
+from rosglass.scene.tools.tool import Tool, Tools
 from rosglass.scene.view.display_configs import (
     add_controller,
     check_panels,
@@ -37,7 +35,9 @@ from rosglass.scene.view.display_configs import (
     create_saved_view,
     show_displays,
 )
-from rosglass.scene.view_controllers.events import Button, Modifier, Touch, Wheel
+from rosglass.scene.view.frame_scheduler import NO_GPU, FrameScheduler, close_renderers
+from rosglass.scene.view.pointer_input import PointerInput
+from rosglass.scene.view_controllers.view_settings import setting_text, setting_value
 from rosglass.scene.view_controllers.views import VIEWS, ViewController, create_view
 
 if TYPE_CHECKING:
@@ -53,19 +53,10 @@ if TYPE_CHECKING:
 
 __all__ = ["NO_GPU", "SceneView"]
 
-NO_GPU = (
-    "The 3D view needs OpenGL, Vulkan, Metal or Direct3D, which this program does not have: Qt "
-    "draws with its software renderer. Unset QT_QUICK_BACKEND; without a graphics card, Mesa's "
-    "llvmpipe will do (on Debian: sudo apt install libgl1-mesa-dri)."
-)
 #: Seconds after its last move at which a camera counts as still.
 _STILL_S = 0.2
 #: Seconds that the camera takes to what it is to look at, and milliseconds between two pictures.
 _TURN_S, _TURN_MS = 0.4, 16
-#: Milliseconds from a change of the scene to a look at what is under the mouse now: RViz's.
-_HOVER_MS = 33
-#: The longest pause after a picture, in seconds.
-_MAX_PAUSE_S = 0.5
 _SCENE_GONE = "The scene was that of another view, which is gone: nothing is shown."
 #: RViz's background.
 _BACKGROUND = (48, 48, 48)
@@ -105,39 +96,13 @@ class SceneView(QQuickRhiItem):
         self._problem = ""
         #: Whether it showed the scene of another view, which is gone.
         self._scene_is_gone = False
-        #: The renderers that C++ still has: letting go of one too early frees it twice.
-        self._renderers: list[SceneRenderer] = []
-        #: The one that draws in the GUI thread, as Qt's basic render loop does; None elsewhere.
-        self._drawing: SceneRenderer | None = None
-        #: When the window began its frame, whether a picture of this view is part of it, and before
-        #: when no other one is drawn: all by the clock of :func:`time.monotonic`.
-        self._frame_began = self._next_picture = 0.0
-        self._is_in_frame = False
-        #: When the wheel or a finger has last moved the camera.
-        self._touched_at = -math.inf
-        #: Whether a change waits until then.
-        self._is_late = False
-        self._later = QtCore.QTimer(self)
-        self._later.setSingleShot(True)
-        self._later.timeout.connect(self._draw_late)
-        #: Whether the mouse is in the view, and when something has moved under it.
-        self._is_hovered = False
-        self._hover = QtCore.QTimer(self)
-        self._hover.setSingleShot(True)
-        self._hover.setInterval(_HOVER_MS)
-        self._hover.timeout.connect(self._hover_again)
-        #: Connections to the window: to each frame, and to the end of the first one until then.
-        self._frames: list[Any] = []
-        self._first_frame: Any = None
+        self._frames = FrameScheduler(self)
         #: What the view itself draws into the scene: its tools, the marks of what is selected.
         self.overlay = Group()
         #: What is selected.
         self._selection = Selection(self, self.overlay, self._drawables, self.camera)
         self.sceneChanged.connect(self._selection.clear)
         self._scene = Scene(self, runtime)
-        self._watch_scene()
-        #: Pictures that renderers have drawn which are gone.
-        self._painted = 0
         #: The config that was loaded; None before.
         self.config: RvizConfig | None = None
         #: Whether its view is of an unknown type, and is kept until another one is chosen.
@@ -151,15 +116,10 @@ class SceneView(QQuickRhiItem):
         self._still = QtCore.QTimer(self)
         self._still.setSingleShot(True)
         self._still.setInterval(int(_STILL_S * 1000))
-        self._still.timeout.connect(self._draw)
+        self._still.timeout.connect(self._frames.draw)
         self.setAcceptHoverEvents(True)
         self.setFlag(QQuickRhiItem.Flag.ItemAcceptsInputMethod, False)
-        self.windowChanged.connect(self._on_window)
         self.setAcceptTouchEvents(True)
-        self._pointed = QtCore.QPointF()
-        self._fingers: dict[int, QtCore.QPointF] = {}
-        #: Whether a finger is the left button of a tool.
-        self._finger_is_button = False
         #: From where the camera turns to what it is to look at, and since when; None while it does
         #: not.
         self._turn: tuple[Camera, float] | None = None
@@ -173,30 +133,26 @@ class SceneView(QQuickRhiItem):
         #: The tools, and the one that has the mouse.
         self._tools = Tools(self, runtime)
         self._tools.currentChanged.connect(self.toolChanged)
-        self.cameraChanged.connect(self._hover_later)
-        self.toolChanged.connect(self._hover_later)
+        self._input = PointerInput(self, self._tools)
+        self.cameraChanged.connect(self._input.hover_later)
+        self.toolChanged.connect(self._input.hover_later)
         self._tools.statusTextChanged.connect(self.statusTextChanged)
         #: The tool that QML wants, which may be declared further down.
         self._wanted_tool = ""
+        self._watch_scene()
         self._clean_up_when_destroyed()
 
     def _clean_up_when_destroyed(self) -> None:
         # PySide never frees the Python half of an item that QML has made.
-        state, renderers, root = self.__dict__, self._renderers, self._scene.root
+        state, renderers, root = self.__dict__, self._frames.renderers, self._scene.root
         overlay = self.overlay
 
         def end() -> None:
             root.on_change = None
             overlay.remove()
             root.clear()
-            kept = list(renderers)
-            for renderer in kept:
-                # C++ has deleted it before or does so a little later, with the scene graph; what
-                # Python has made on the device is freed by neither.
-                renderer.close()
+            close_renderers(renderers)
             state.clear()
-            _ORPHANS.extend(kept)
-            _drop_orphans()
 
         self.destroyed.connect(end)
 
@@ -204,9 +160,9 @@ class SceneView(QQuickRhiItem):
 
     @Slot()
     def _on_scene(self) -> None:
-        self._request_picture()
+        self._frames.request_picture()
         self._selection.on_scene()
-        self._hover_later()
+        self._input.hover_later()
 
     def _watch_scene(self) -> None:
         self._scene.changed.connect(self._on_scene)
@@ -431,7 +387,7 @@ class SceneView(QQuickRhiItem):
             {
                 "name": one["path"],
                 "kind": one["kind"],
-                "value": _setting_text(one["value"]),
+                "value": setting_text(one["value"]),
                 "choices": self._choices_of(one),
                 "description": one["description"],
             }
@@ -447,7 +403,7 @@ class SceneView(QQuickRhiItem):
     def setViewSetting(self, name: str, text: str) -> str:
         """Change a setting of the view; return why it does not fit, or an empty text."""
         try:
-            self._view.set(name, _setting_value(self._view.get(name), text))
+            self._view.set(name, setting_value(self._view.get(name), text))
         except Error as error:
             return str(error)
         self.camera_moved()
@@ -568,7 +524,7 @@ class SceneView(QQuickRhiItem):
 
     def pictures_drawn(self) -> int:
         """Return how many pictures were drawn."""
-        return self._painted + sum(one.count for one in self._renderers)
+        return self._frames.pictures_drawn
 
     # -- config files ----------------------------------------------------------------------------
 
@@ -670,17 +626,18 @@ class SceneView(QQuickRhiItem):
     @Slot()
     def _on_turning(self) -> None:
         if self._turn is not None and time.monotonic() - self._turn[1] >= _TURN_S:
-            self._stop_turning()
+            self.stop_turning()
         self.camera_moved()
 
-    def _stop_turning(self) -> None:
+    def stop_turning(self) -> None:
+        """Look at once from where the camera turns to."""
         self._turn = None
         self._turning.stop()
 
     @property
     def is_complete(self) -> bool:
         """Whether the last picture showed all: new data is uploaded over several pictures."""
-        return all(one.is_complete for one in self._renderers if Shiboken.isValid(one))
+        return self._frames.is_complete
 
     @property
     def is_loading(self) -> bool:
@@ -690,9 +647,9 @@ class SceneView(QQuickRhiItem):
     def camera_moved(self) -> None:
         """Draw from where the camera is now."""
         self._still.start()
-        self._show_focal_shape()
+        self.show_focal_shape()
         self.cameraChanged.emit()
-        self._request_picture()
+        self._frames.request_picture()
 
     @Slot()
     def _on_placed(self) -> None:
@@ -706,7 +663,7 @@ class SceneView(QQuickRhiItem):
                 reason = str(error)
             if view.update_target(pose, reason):
                 self.cameraChanged.emit()
-                self._request_picture()
+                self._frames.request_picture()
         # Without transforms, displays say so.
         buffer = scene.transforms
         is_connected = buffer is not None and buffer.has_frame(scene.fixed_frame)
@@ -749,28 +706,12 @@ class SceneView(QQuickRhiItem):
 
     def createRenderer(self) -> SceneRenderer:
         """Return what draws; called by Qt in the render thread."""
-        made = SceneRenderer(self._take_frame, self._on_problem)
-        self._renderers.append(made)
-        self._drawing = made if QtCore.QThread.currentThread() == self.thread() else None
-        # C++ deletes the one of the window before later.
-        QtCore.QTimer.singleShot(0, self, self._drop_renderers)
-        return made
-
-    @Slot()
-    def _drop_renderers(self) -> None:
-        """Drop the renderers that C++ has deleted, e.g. those of a window that it has left."""
-        for one in self._renderers:
-            if not Shiboken.isValid(one):
-                one.close()
-                self._painted += one.count
-        self._renderers[:] = [one for one in self._renderers if Shiboken.isValid(one)]
+        return self._frames.create_renderer(self._take_frame, self._on_problem)
 
     def _take_frame(self) -> Frame:
         if not is_alive(self._scene):  # it was that of a view that is gone
             return Frame([], self.camera(), self._background)
-        if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
-            QtCore.QTimer.singleShot(0, self, self._report_device)
-        self._is_in_frame, self._is_late = True, False
+        self._frames.begin()
         return Frame(
             list(self._drawables()),
             self.camera(),
@@ -779,252 +720,78 @@ class SceneView(QQuickRhiItem):
             self.is_moving,
         )
 
-    def _request_picture(self) -> None:
-        """Draw what has changed; where the processor draws, QML has half of the time.
-
-        What the user moves is drawn at once.
-        """
-        now = time.monotonic()
-        if now >= self._next_picture or self._is_moved_by_user(now):
-            self._draw()
-            return
-        self._is_late = True
-        if not self._later.isActive():
-            self._later.start(math.ceil(1000 * (self._next_picture - now)))
-
-    @Slot()
-    def _draw(self) -> None:
-        """Draw the next picture; the window once with it, where the GUI thread draws."""
-        renderer = self._drawing
-        if renderer is not None and Shiboken.isValid(renderer) and self.isVisible():
-            renderer.draw_again()
-        else:
-            self.update()
-
-    def _is_moved_by_user(self, now: float) -> bool:
-        is_touched = self._tools.holds_mouse or now - self._touched_at < _STILL_S
+    def is_moved_by_user(self, now: float) -> bool:
+        """Return whether the user moves the camera or drags something now."""
+        is_touched = self._tools.holds_mouse or now - self._input.touched_at < _STILL_S
         return is_touched or self.is_turning
-
-    @Slot()
-    def _draw_late(self) -> None:
-        if self._is_late:
-            self._request_picture()
-
-    @Slot()
-    def _on_frame(self) -> None:
-        self._frame_began = time.monotonic()
-
-    @Slot()
-    def _on_frame_swapped(self) -> None:
-        if self._is_in_frame:
-            self._is_in_frame = False
-            if self.scene.draws_in_software:
-                now = time.monotonic()
-                self._next_picture = now + min(now - self._frame_began, _MAX_PAUSE_S)
-
-    @Slot()
-    def _take_mouse(self) -> None:
-        # After the window's first frame, as PySide then makes all of Qt's enumerations, in 12 ms.
-        self.setAcceptedMouseButtons(QtCore.Qt.MouseButton.AllButtons)
-        self._forget_first_frame()
-
-    def _forget_first_frame(self) -> None:
-        # Where another thread draws, the ends of further frames may be on their way already.
-        first, self._first_frame = self._first_frame, None
-        if first is not None:
-            QtCore.QObject.disconnect(first)
-
-    @Slot()
-    def _report_device(self) -> None:
-        in_software = any(one.draws_in_software for one in self._renderers)
-        self.scene.set_draws_in_software(in_software)
 
     def _on_problem(self, problem: str) -> None:
         # From the render thread, in the middle of drawing.
-        QtCore.QTimer.singleShot(0, self, lambda: self._set_problem(problem))
+        QtCore.QTimer.singleShot(0, self, lambda: self.set_problem(problem))
 
-    def _set_problem(self, problem: str) -> None:
+    def set_problem(self, problem: str) -> None:
+        """Say why nothing is drawn; empty once it is."""
         if is_alive(self) and problem != self._problem:
             self._problem = problem
             self.problemChanged.emit()
             if is_alive(self._scene):
                 self._scene._log(problem, logging.WARNING)
 
-    @Slot(QQuickWindow)
-    def _on_window(self, window: QQuickWindow | None) -> None:
-        while self._frames:
-            QtCore.QObject.disconnect(self._frames.pop())
-        self._forget_first_frame()
-        self._free_devices()
-        self._drawing = None
-        if window is None:
-            return
-        self._frames.append(window.sceneGraphInvalidated.connect(self._free_devices))
-        self._frames.append(window.afterAnimating.connect(self._on_frame))
-        self._frames.append(window.frameSwapped.connect(self._on_frame_swapped))
-        self._first_frame = window.afterFrameEnd.connect(self._take_mouse)
-        api = window.rendererInterface().graphicsApi()
-        self._set_problem(NO_GPU if api == QSGRendererInterface.GraphicsApi.Software else "")
-
-    @Slot()
-    def _free_devices(self) -> None:
-        """Free what is on the device before the window, which has it, is gone."""
-        if self._drawing is not None:
-            for renderer in self._renderers:
-                renderer.close()
-
     # -- mouse, touch, keys ----------------------------------------------------------------------
-
-    def _event(self, event: Any) -> PointerEvent:
-        """Return an event of the mouse, and remember where it is."""
-        at, before = event.position(), self._pointed
-        self._pointed = at
-        return PointerEvent(
-            self,
-            (at.x(), at.y()),
-            (at.x() - before.x(), at.y() - before.y()),
-            Button(event.button().value & _BUTTONS),
-            Button(event.buttons().value & _BUTTONS),
-            Modifier(event.modifiers().value & _MODIFIERS),
-        )
-
-    def _event_at(self, at: QtCore.QPointF, event: Any, *, finger: bool = False) -> PointerEvent:
-        """Return an event that is none of the mouse's."""
-        held = Modifier(event.modifiers().value & _MODIFIERS)
-        before, self._pointed = self._pointed, at
-        moved = (at.x() - before.x(), at.y() - before.y()) if finger else (0.0, 0.0)
-        return PointerEvent(self, (at.x(), at.y()), moved, modifiers=held)
 
     def mousePressEvent(self, event: Any) -> None:
         """Give a press to the tool, or start to drag the camera."""
-        if self._focus_on_click:
-            self.forceActiveFocus(QtCore.Qt.FocusReason.MouseFocusReason)
-        self._stop_turning()
-        event.accept()
-        self._tools.on_press(self._event(event))
-        if is_alive(self):
-            self._show_focal_shape()
+        self._input.press(event)
 
     def mouseMoveEvent(self, event: Any) -> None:
         """Give a drag to the tool, or drag the camera."""
-        self._tools.on_move(self._event(event))
-        event.accept()
+        self._input.move(event)
 
     def mouseReleaseEvent(self, event: Any) -> None:
         """End a drag."""
-        event.accept()
-        self._tools.on_release(self._event(event))
-        if is_alive(self):
-            self._show_focal_shape()
+        self._input.release(event)
 
     def mouseUngrabEvent(self) -> None:
         """Drop a drag that another item has taken over."""
         if is_alive(self):
-            self._tools.cancel()
-            self._show_focal_shape()
+            self._input.ungrab()
 
     def hoverEnterEvent(self, event: Any) -> None:
         """Show what is under the mouse, which may not move again."""
-        self.hoverMoveEvent(event)
+        self._input.hover(event)
 
     def hoverMoveEvent(self, event: Any) -> None:
         """Show what is under the mouse."""
-        self._is_hovered = True
-        self._tools.on_move(self._event_at(event.position(), event))
+        self._input.hover(event)
 
     def hoverLeaveEvent(self, event: Any) -> None:
         """Show nothing any more of what was under the mouse."""
         super().hoverLeaveEvent(event)
         if is_alive(self):
-            self._is_hovered = False
-            self._tools.on_leave()
-
-    @Slot()
-    def _hover_later(self) -> None:
-        if self._is_hovered and not self._hover.isActive():
-            self._hover.start()
-
-    @Slot()
-    def _hover_again(self) -> None:
-        """Show what is under the mouse, which has stayed where it is."""
-        if self._is_hovered and not self._tools.holds_mouse:
-            modifiers = Modifier(QGuiApplication.keyboardModifiers().value & _MODIFIERS)
-            at = (self._pointed.x(), self._pointed.y())
-            self._tools.on_move(PointerEvent(self, at, modifiers=modifiers))
-            if is_alive(self):
-                # What a tool shows of it is no reason to look once more.
-                self._hover.stop()
+            self._input.leave()
 
     def wheelEvent(self, event: Any) -> None:
         """Zoom."""
-        self._stop_turning()
-        self._touched_at = time.monotonic()
-        at = self._event_at(event.position(), event)
-        self._tools.on_wheel(at, Wheel(event.angleDelta().y() / 120, at.modifiers))
-        event.accept()
+        self._input.wheel(event)
 
     def touchEvent(self, event: Any) -> None:
         """Let one finger be the tool's left button; otherwise rotate, move and zoom by fingers."""
-        event.accept()
-        self._stop_turning()
-        self._touched_at = time.monotonic()
-        points = event.points()
-        now = {point.id(): point.position() for point in points}
-        held = {p.id(): p.position() for p in points if p.state() != QEventPoint.State.Released}
-        if self._finger_is_button and len(now) > 1:
-            self._finger_is_button = False
-            self._tools.cancel()
-        elif len(now) == 1:
-            (point,) = points
-            pointer = self._event_at(point.position(), event, finger=True)
-            # Not a finger that has stayed after a pinch: its release would send a goal.
-            if not self._fingers and point.state() == QEventPoint.State.Pressed:
-                pointer.button = pointer.buttons = Button.LEFT
-                self._finger_is_button = self._tools.on_press(pointer)
-                if not self._finger_is_button:
-                    self._tools.cancel()
-            elif self._finger_is_button:
-                if not held:
-                    pointer.button = Button.LEFT
-                    self._tools.on_release(pointer)
-                    self._finger_is_button = False
-                else:
-                    pointer.buttons = Button.LEFT
-                    self._tools.on_move(pointer)
-                self._fingers = held
-                return
-        self._drag_by_fingers(now)
-        self._fingers = held
-
-    def _drag_by_fingers(self, now: dict[int, QtCore.QPointF]) -> None:
-        ids = [one for one in now if one in self._fingers]
-        if ids and len(now) == len(self._fingers):
-            before = [(self._fingers[one].x(), self._fingers[one].y()) for one in ids]
-            after = [(now[one].x(), now[one].y()) for one in ids]
-            self._tools.on_touch(Touch.between(before, after, (self.width(), self.height())))
+        self._input.touch(event)
 
     def touchUngrabEvent(self) -> None:
         """Drop what another item has taken over."""
         if is_alive(self):
-            self._fingers, self._finger_is_button = {}, False
-            self._tools.cancel()
+            self._input.ungrab_touch()
 
     def keyPressEvent(self, event: Any) -> None:
         """Handle the keys of tools, F and Z, and Escape."""
-        self._tools.on_modifiers(Modifier(event.modifiers().value & _MODIFIERS))
-        used = False
-        if event.key() == QtCore.Qt.Key.Key_Escape:
-            used = self._tools.on_escape()
-        elif event.text() and not (event.isAutoRepeat() or event.modifiers().value & _COMMAND_KEYS):
-            used = self._tools.on_key(event.text(), self._event_at(self._pointed, event))
-        event.setAccepted(used)
+        self._input.press_key(event)
 
     def keyReleaseEvent(self, event: Any) -> None:
         """Follow keys like Shift."""
-        self._tools.on_modifiers(Modifier(event.modifiers().value & _MODIFIERS))
-        event.ignore()
+        self._input.release_key(event)
 
-    def _show_focal_shape(self) -> None:
+    def show_focal_shape(self) -> None:
         """Show what the camera turns around, while it is dragged."""
         shape = self._view.focal_shape() if self._tools.moves_camera else None
         if shape is not None:
@@ -1032,46 +799,3 @@ class SceneView(QQuickRhiItem):
             size = instance_matrix(scale=shape.size)[np.newaxis]
             self._focal.set_instances(size, shape.color)
         self._focal.visible = shape is not None
-
-
-#: With these, a key is a command of the program and no tool's.
-_COMMAND_KEYS = int(Modifier.CTRL | Modifier.ALT | Modifier.META)
-_BUTTONS = int(Button.LEFT | Button.RIGHT | Button.MIDDLE)
-_MODIFIERS = int(Modifier.SHIFT | Modifier.CTRL | Modifier.ALT)
-
-
-def _setting_text(value: Any) -> Any:
-    if isinstance(value, bool):
-        return value
-    if isinstance(value, dict):
-        return "; ".join(_coordinate_text(number) for number in value.values())
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _coordinate_text(metres: float) -> str:
-    # Of UTM coordinates, too.
-    return f"{round(metres, 5):.12g}"
-
-
-def _setting_value(before: Any, text: str) -> Any:
-    """Return a text as what a setting of a view holds; texts that do not fit stay texts."""
-    if isinstance(before, bool):
-        return {"true": True, "false": False}.get(text.strip().lower(), text)
-    if isinstance(before, tuple):
-        numbers = text.replace(";", " ").replace(",", " ").split()
-        if len(numbers) != 3:
-            return text
-        # Coordinates that were not edited keep the digits that are not shown.
-        return {
-            axis: old if new == _coordinate_text(old) else new
-            for axis, old, new in zip("XYZ", before, numbers, strict=True)
-        }
-    return text
-
-
-#: Renderers of items that are gone, until C++ has deleted them.
-_ORPHANS: list[SceneRenderer] = []
-
-
-def _drop_orphans() -> None:
-    _ORPHANS[:] = [one for one in _ORPHANS if Shiboken.isValid(one)]

@@ -24,6 +24,8 @@ __all__ = [
     "ScaleSetting",
     "ViewSetting",
     "finite_number",
+    "setting_text",
+    "setting_value",
 ]
 
 MAX_NAME_LENGTH = 1000
@@ -215,3 +217,33 @@ def finite_number(value: Any, name: str) -> float:
     if not math.isfinite(number):
         raise ArgumentError(name, value, "a finite number")
     return number
+
+
+def setting_text(value: Any) -> Any:
+    """Return the value of a setting as a panel shows it."""
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, dict):
+        return "; ".join(_coordinate_text(number) for number in value.values())
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _coordinate_text(metres: float) -> str:
+    # Of UTM coordinates, too.
+    return f"{round(metres, 5):.12g}"
+
+
+def setting_value(before: Any, text: str) -> Any:
+    """Return a text as what a setting of a view holds; texts that do not fit stay texts."""
+    if isinstance(before, bool):
+        return {"true": True, "false": False}.get(text.strip().lower(), text)
+    if isinstance(before, tuple):
+        numbers = text.replace(";", " ").replace(",", " ").split()
+        if len(numbers) != 3:
+            return text
+        # Coordinates that were not edited keep the digits that are not shown.
+        return {
+            axis: old if new == _coordinate_text(old) else new
+            for axis, old, new in zip("XYZ", before, numbers, strict=True)
+        }
+    return text
