@@ -67,11 +67,11 @@ class Peer:
         return self.answer(self.start(do, **plan), timeout)
 
     def event(self, key: str, timeout: float = 30.0, **otherwise: Any) -> Any:
-        """Return the value of the next event of this name that the peer told by itself."""
+        """Return the value of the peer's next event of this name."""
         return self.process.event(key, timeout, **otherwise)
 
     def end(self) -> None:
-        """Kill it: nobody is told."""
+        """Kill it, without a goodbye to the master or other nodes."""
         self.process.end()
 
 

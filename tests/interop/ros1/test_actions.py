@@ -71,10 +71,10 @@ def ended(peer, key):
     """Return the states that a peer's goal goes through, and how it ends."""
     states = []
     while True:
-        told = peer.event(f"state {key}")
-        states.append(told.pop("state"))
+        report = peer.event(f"state {key}")
+        states.append(report.pop("state"))
         if states[-1] == "DONE":
-            return states, told
+            return states, report
 
 
 # -- our client ------------------------------------------------------------------------------------
@@ -243,15 +243,15 @@ def test_a_simple_server_preempts_goals_for_newer_ones(peer, name, connect):
 
 def test_readiness_comes_and_goes(rospy_peer, name, connect):
     client = connect("us").create_action_client(name, TYPE)
-    told = []
-    client.on_ready_change(told.append)
+    changes = []
+    client.on_ready_change(changes.append)
     assert client.wait_for_server(0.2) is False
     rospy_peer.call("action_server", name=name)
-    eventually(lambda: told == [True])
+    eventually(lambda: changes == [True])
     goal = client.send_goal({"goal": 2000})
     eventually(lambda: goal.feedback is not None)
     rospy_peer.call("stop_action_server", name=name)
-    eventually(lambda: told == [True, False])
+    eventually(lambda: changes == [True, False])
     with pytest.raises(ConnectionLostError, match="left before goal"):
         goal.result(30)
     assert goal.terminal_state is TerminalState.LOST

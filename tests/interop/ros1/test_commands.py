@@ -39,7 +39,7 @@ def robot(start_rospy, master) -> Any:
 
 @pytest.fixture
 def run(robot: Any, master: Any, monkeypatch: pytest.MonkeyPatch, run_command: Any) -> Any:
-    """Run a command of somebody who has set up his shell for the robot."""
+    """Run a command in an environment that is set up for the robot."""
     for name in ("ROSGLASS_URL", "ROS_DISTRO", "ROS_DOMAIN_ID", "RMW_IMPLEMENTATION"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("ROS_IP", "127.0.0.1")
@@ -128,10 +128,10 @@ def test_a_latched_topic_pub_stays_until_ctrl_c(start_command, tool):
     assert process.wait(30) == 130
 
 
-def test_topic_pub_tells_what_is_missing(run):
-    code, _, err = run("topic", "pub", "-1", "/nobody", "{}", "--timeout", "0.5")
+def test_topic_pub_asks_for_a_missing_type(run):
+    code, _, err = run("topic", "pub", "-1", "/unused", "{}", "--timeout", "0.5")
     assert (code, err) == (
-        1, "rosglass: no node uses /nobody yet: give its type, e.g. std_msgs/String\n",
+        1, "rosglass: no node uses /unused yet: give its type, e.g. std_msgs/String\n",
     )  # fmt: skip
 
 
@@ -155,9 +155,9 @@ def test_types_are_spelled_as_in_ros1(run):
     assert "geometry_msgs/Twist: linear.x: expected" in outputs[2][2]
 
 
-def test_what_is_awaited_is_told_with_similar_names(run):
+def test_missing_names_are_reported_with_similar_ones(run):
     twist, trigger = "geometry_msgs/Twist", "std_srvs/Trigger"
-    for line, told in (
+    for line, message in (
         (("topic", "pub", "-1", "/cmd_vell", "{}"), "uses /cmd_vell; did you mean /cmd_vel"),
         (("topic", "pub", "-1", "/cmd_vell", twist, "{}"), "; did you mean /cmd_vel?"),
         (("service", "call", "/robot/stopp", trigger, "{}"), "; did you mean /robot/stop?"),
@@ -168,17 +168,17 @@ def test_what_is_awaited_is_told_with_similar_names(run):
         assert code == 1
         first = err.splitlines()[0]
         assert first.startswith("rosglass: waiting: ")
-        assert told in first
+        assert message in first
 
 
-def test_a_refused_master_is_told_at_once(run, start_command):
+def test_unreachable_master_is_reported_at_once(run, start_command):
     url = "ros1://127.0.0.1:1"
-    told = "no master runs: 127.0.0.1 is there, but nothing listens on its port 1; "
+    message = "no master runs: 127.0.0.1 is there, but nothing listens on its port 1; "
     code, _, err = run("topic", "list", "--url", url)
-    assert (code, told in err) == (1, True)
+    assert (code, message in err) == (1, True)
     assert "roscore -p 1" in err
     process = start_command("topic", "echo", "/pose", "--url", url)
-    assert told in process.stderr.readline()
+    assert message in process.stderr.readline()
     assert process.poll() is None
 
 
@@ -331,18 +331,18 @@ def test_doctor_finds_what_is_wrong(run, master, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("uri", "told"),
+    ("uri", "message"),
     [
         ("http://127.0.0.1:1", "no master runs: 127.0.0.1 is there"),
-        ("http://nobody.invalid:11311", "no computer is called nobody.invalid"),
+        ("http://robot.invalid:11311", "no computer is called robot.invalid"),
         ("http://127.0.0.1", "ROS_MASTER_URI"),
     ],
 )
-def test_doctor_says_why_there_is_no_master(run, monkeypatch, uri, told):
+def test_doctor_explains_a_missing_master(run, monkeypatch, uri, message):
     monkeypatch.setenv("ROS_MASTER_URI", uri)
     code, out, _ = run("doctor", "--timeout", "1")
     assert code == 1
-    assert told in out
+    assert message in out
 
 
 def test_record_and_play_commands(run, robot, start_command, tmp_path, tool, master):
@@ -355,8 +355,8 @@ def test_record_and_play_commands(run, robot, start_command, tmp_path, tool, mas
     assert "1 /map [nav_msgs/OccupancyGrid]" in run("play", "--list", str(bag))[1]
     process = start_command("play", str(bag), "-m", "/map:=/replayed", "-t", "/map", "-d", "3",
                             "--clock")  # fmt: skip
-    told = tool("rostopic", "echo", "-n1", "/replayed/info/width")
-    assert told.endswith("500\n---\n")
+    width = tool("rostopic", "echo", "-n1", "/replayed/info/width")
+    assert width.endswith("500\n---\n")
     out, err = process.communicate(timeout=60)
     assert process.returncode == 0, err
     assert "1 messages sent" in out

@@ -55,7 +55,7 @@ def robot(master: RosMaster) -> Any:
 def given(
     robot: Node, connect: Callable[..., Node], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> dict[str, Any]:
-    """What a reader has before a block: a connected node, and the files that it names."""
+    """Return the names that a block may use: a connected node, and files in the current folder."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "robot.yaml").write_text("speed: 1.5\n", encoding="utf-8")
     connected = rosglass.connect

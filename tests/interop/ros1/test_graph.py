@@ -17,13 +17,13 @@ def test_nodes_topics_and_services_come_and_go(connect, start_rospy, start_roscp
     node.on_graph_change(changed.set)
     peer, other = start_rospy("camera"), start_roscpp("base")
     peer.call("publish", topic="/image", type="sensor_msgs/Image")
-    peer.call("subscribe", topic="/words", type="*", tell=False)
+    peer.call("subscribe", topic="/words", type="*", reports=False)
     eventually(lambda: {"/image", "/words"} <= node.topics().keys())
     eventually(lambda: {NodeName("/", "camera"), NodeName("/", "base")} <= set(node.nodes()))
     assert changed.is_set()
     assert NodeName("/ops", "panel") in node.nodes()  # although it has registered nothing
     assert node.topics()["/image"] == ["sensor_msgs/msg/Image"]
-    assert node.topics()["/words"] == []  # nobody has told its type
+    assert node.topics()["/words"] == []  # its type is unknown so far
     (image,) = node.publishers("/image")
     assert (image.node.full, image.type) == ("/camera", "sensor_msgs/msg/Image")
     (words,) = node.subscriptions("/words")
@@ -34,7 +34,7 @@ def test_nodes_topics_and_services_come_and_go(connect, start_rospy, start_roscp
     assert (EndpointKind.SERVICE_SERVER, "/camera/get_loggers") in ends
     assert node.endpoints("/camera") == node.endpoints(NodeName("/", "camera"))
 
-    # The type is known as soon as somebody tells it.
+    # The type is known as soon as a node announces it.
     changed.clear()
     other_words = connect("talker").create_publisher("/words", "std_msgs/String")
     eventually(lambda: node.topics()["/words"] == ["std_msgs/msg/String"])
@@ -61,7 +61,7 @@ def test_a_node_that_was_killed_stays_until_it_is_cleaned_up_and_is_named(
     assert "/doomed" in tool("rosnode", "cleanup", stdin="y\n")
     eventually(lambda: NodeName("/", "doomed") not in node.nodes())
     eventually(lambda: "refused" not in subscription.problem, what=lambda: subscription.problem)
-    # Whoever takes its place is found.
+    # Its successor is found.
     again = start_rospy("doomed")
     again.call("publish", topic="/pulse", type="std_msgs/Empty", value={}, rate=20, count=0)
     while subscription.take() is not None:
@@ -70,17 +70,17 @@ def test_a_node_that_was_killed_stays_until_it_is_cleaned_up_and_is_named(
     again.end()
 
 
-def test_rosnode_tells_our_connections_by_node_and_port(connect, start_rospy, tool):
+def test_rosnode_shows_our_connections_by_node_and_port(connect, start_rospy, tool):
     node, peer = connect("panel"), start_rospy("peer")
     publisher = node.create_publisher("/out", "std_msgs/Empty")
     subscription = node.create_subscription("/in", "std_msgs/Empty")
-    peer.call("subscribe", topic="/out", type="std_msgs/Empty", tell=False)
+    peer.call("subscribe", topic="/out", type="std_msgs/Empty", reports=False)
     peer.call("publish", topic="/in", type="std_msgs/Empty")
     eventually(publisher.subscription_count)
     eventually(subscription.publisher_count)
-    told = tool("rosnode", "info", "/panel")
+    info = tool("rosnode", "info", "/panel")
     inbound, outbound = (
-        told.partition(f"* topic: {topic}\n")[2].splitlines()[:3] for topic in ("/in", "/out")
+        info.partition(f"* topic: {topic}\n")[2].splitlines()[:3] for topic in ("/in", "/out")
     )
     assert inbound[0].split()[:3] == ["*", "to:", "/peer"]
     assert outbound[0].split()[:3] == ["*", "to:", "/peer"]
@@ -101,7 +101,7 @@ def test_udp_is_refused_and_tcp_taken_in_its_place(connect, roscpp_peer):
     only = node.create_publisher("/only", "std_msgs/String")
     roscpp_peer.call("subscribe_udp", topic="/only", fallback=False)
     eventually(lambda: node.subscriptions("/only"))
-    only.publish(data="nobody hears it")
+    only.publish(data="not received")
     assert roscpp_peer.call("udp_sources", topic="/only") == 0
     assert only.subscription_count() == 0
     assert node.status().state.value == "connected"
@@ -123,12 +123,12 @@ def test_we_relay_what_we_need_not_know(connect, rospy_peer, kind):
     rospy_peer.call("subscribe", topic=f"{topic}/out", type=kind)
     rospy_peer.call("publish", topic=f"{topic}/in", type=kind, value={"header": header},
                     rate=20, count=0)  # fmt: skip
-    told = rospy_peer.event("received")
-    while told["topic"] != f"{topic}/out":  # the last ones of the type before
-        told = rospy_peer.event("received")
-    assert told["value"]["header"]["frame_id"] == "map"
-    assert told["header"]["type"] == kind
-    assert told["header"]["callerid"] == "/relay"
+    received = rospy_peer.event("received")
+    while received["topic"] != f"{topic}/out":  # the last ones of the type before
+        received = rospy_peer.event("received")
+    assert received["value"]["header"]["frame_id"] == "map"
+    assert received["header"]["type"] == kind
+    assert received["header"]["callerid"] == "/relay"
     rospy_peer.call("unpublish", topic=f"{topic}/in")
     rospy_peer.call("unsubscribe", topic=f"{topic}/out")
     source.close()
@@ -144,7 +144,7 @@ def test_a_relay_of_rospy_that_names_no_type_is_understood_when_we_give_one(conn
     eventually(typed.publisher_count)
 
     def relayed():
-        # rospy tells a subscriber that it is connected, and sends it what comes a moment later.
+        # rospy reports a connection as ready, and sends messages only a moment later.
         source.publish(data="whatever")
         return typed.wait(0.5)
 

@@ -16,7 +16,7 @@ from waiting import eventually
 import rosglass
 from rosglass.comm import ConnectionState
 
-#: An address that is nobody's (TEST-NET-1).
+#: An address that no machine has (TEST-NET-1).
 NOWHERE = "192.0.2.1"
 
 
@@ -32,7 +32,7 @@ def registered(master, topic):
     return dict(publishers).get(topic, []), dict(subscribers).get(topic, [])
 
 
-def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
+def test_restarted_master_lists_us_again_and_messages_go_on_until_then(
     own_master, connect, start_rospy
 ):
     peer = start_rospy("peer", master=own_master)
@@ -40,7 +40,7 @@ def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
     commands = node.create_publisher("/commands", "std_msgs/Int32")
     words = node.create_subscription("/words")
     node.create_service_server("/reset", "std_srvs/Empty", lambda _: None)
-    peer.call("subscribe", topic="/commands", type="std_msgs/Int32", tell=False)
+    peer.call("subscribe", topic="/commands", type="std_msgs/Int32", reports=False)
     peer.call("publish", topic="/words", type="std_msgs/String", value={"data": "w"}, rate=50,
               count=0)  # fmt: skip
     eventually(commands.subscription_count)
@@ -75,7 +75,7 @@ def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
     assert [event.change for event in joined] == [1]
     assert words.problem == ""
 
-    # Whoever comes now is found by both sides.
+    # New nodes are found by both sides.
     late = connect("late", url=own_master.url)
     late.create_publisher("/words", "std_msgs/String")
     receiver = late.create_subscription("/commands")
@@ -88,14 +88,14 @@ def test_a_restarted_master_learns_of_us_and_messages_go_on_meanwhile(
 def test_a_master_that_starts_late_is_found(own_master, connect, tool):
     own_master.kill()
     node = connect("early", url=own_master.url, wait=False)
-    told = []
-    node.on_status_change(told.append)
+    statuses = []
+    node.on_status_change(statuses.append)
     publisher = node.create_publisher("/early", "std_msgs/Empty")
     subscription = node.create_subscription("/early")
     eventually(lambda: "Connection refused" in node.status().detail)
     assert node.status().state is ConnectionState.CONNECTING
     own_master.start()
-    eventually(lambda: told and told[-1].state is ConnectionState.CONNECTED)
+    eventually(lambda: statuses and statuses[-1].state is ConnectionState.CONNECTED)
     eventually(publisher.subscription_count)
     publisher.publish()
     subscription.wait(30)
@@ -125,7 +125,7 @@ def test_a_master_that_hangs_holds_up_neither_topics_nor_closing(own_master, con
             assert node.status().state is ConnectionState.CLOSED
     finally:
         os.kill(pid, signal.SIGCONT)
-    # Once it answers again, it learns who has left meanwhile.
+    # Once it answers again, it learns that the node has left.
     eventually(lambda: registered(own_master, "/count") == ([], []), timeout=30)
 
 
@@ -161,7 +161,7 @@ def test_many_nodes_come_and_go_without_a_trace(own_master, connect):
     assert [part for part in own_master.call("getSystemState") if part] == []
 
 
-def test_the_master_is_told_again_of_what_it_forgot_alone(own_master, connect):
+def test_registration_that_the_master_lost_is_renewed(own_master, connect):
     node = connect("panel", url=own_master.url)
     node.create_publisher("/one", "std_msgs/Empty")
     node.create_publisher("/two", "std_msgs/Empty")
@@ -191,8 +191,8 @@ def test_publishers_are_found_though_the_master_cannot_call_us(own_master, conne
 @pytest.mark.parametrize("peer", ["rosglass", "rospy", "roscpp"])
 def test_the_older_of_two_nodes_of_a_name_ends(own_master, connect, request, peer):
     older = connect("twin", url=own_master.url)
-    told, done = [], threading.Event()
-    older.on_status_change(lambda status: (told.append(status), done.set()))
+    statuses, done = [], threading.Event()
+    older.on_status_change(lambda status: (statuses.append(status), done.set()))
     older.create_publisher("/old", "std_msgs/Empty")
     eventually(lambda: registered(own_master, "/old")[0])
     if peer == "rosglass":
@@ -203,8 +203,8 @@ def test_the_older_of_two_nodes_of_a_name_ends(own_master, connect, request, pee
         newer = start("twin", master=own_master)
     eventually(lambda: older.status().state is ConnectionState.CLOSED)
     done.wait(30)
-    assert told[-1] == older.status()
-    assert "same name" in told[-1].detail or "has the name /twin now" in told[-1].detail
+    assert statuses[-1] == older.status()
+    assert "same name" in statuses[-1].detail or "has the name /twin now" in statuses[-1].detail
     with pytest.raises(rosglass.NodeClosedError, match="/twin is closed"):
         older.create_publisher("/late", "std_msgs/Empty")
     if peer == "rosglass":
@@ -226,7 +226,9 @@ def test_a_node_on_the_port_of_one_that_was_killed_does_not_end_in_its_place(
     assert node.status().state is ConnectionState.CONNECTED
 
 
-def test_a_node_ends_although_the_master_cannot_tell_it_that_its_name_is_taken(own_master, connect):
+def test_node_ends_although_the_master_cannot_reach_it_to_report_its_name_taken(
+    own_master, connect
+):
     older = connect("twin", url=f"ros1://127.0.0.1:{own_master.port}?ip={NOWHERE}")
     older.create_publisher("/old", "std_msgs/Empty")
     eventually(lambda: registered(own_master, "/old")[0])

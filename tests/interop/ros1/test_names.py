@@ -95,7 +95,7 @@ def test_we_are_reached_where_we_say(arguments, env, host, start_rospy, monkeypa
         peer.end()
 
 
-def test_without_being_told_we_announce_what_others_reach(start_rospy, monkeypatch, master):
+def test_reachable_address_is_announced_without_configuration(start_rospy, monkeypatch, master):
     for name in ("ROS_IP", "ROS_HOSTNAME"):
         monkeypatch.delenv(name, raising=False)
     with rosglass.connect(f"ros1://127.0.0.1:{master.port}", "found") as node:

@@ -97,8 +97,8 @@ def test_cleanup(run, master, monkeypatch, free_port):
         assert out.startswith(f"/dead: {api} does not answer")
         assert "/robot" not in out
         assert "nothing was changed" in err
-    only_told = {"unreachable": ["/dead"], "removed": []}
-    assert json.loads(run("node", "cleanup", "--json")[1]) == only_told
+    unchanged = {"unreachable": ["/dead"], "removed": []}
+    assert json.loads(run("node", "cleanup", "--json")[1]) == unchanged
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
     code, out, _ = run("node", "cleanup")
     assert (code, out.splitlines()[-1]) == (0, f"{master.uri} has forgotten /dead")
@@ -111,7 +111,7 @@ def test_cleanup(run, master, monkeypatch, free_port):
 
 
 @pytest.mark.parametrize("what", [["ping", "/a"], ["kill", "/a"], ["cleanup"]])
-def test_what_ros_2_does_not_have_is_refused(run, what):
+def test_ros_1_commands_are_refused_for_ros_2(run, what):
     code, _, err = run("node", *what, "--url", "dds://?domain=7")
     assert (code, err.count("\n")) == (1, 1)
     assert f"rosglass node {what[0]} is for ROS 1: say --url ros1://robot:11311" in err

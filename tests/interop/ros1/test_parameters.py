@@ -45,15 +45,15 @@ def test_rosparam_lists_and_deletes_ours_and_we_see_what_it_sets(server, tool):
     server.set("/l", {"a": 1, "b": {"c": 2}})
     assert tool("rosparam", "list", "/l").split() == ["/l/a", "/l/b/c"]
     assert server.names("/l") == ["/l/a", "/l/b/c"]
-    told: list[object] = []
-    subscription = server.subscribe("/l", told.append)
+    notified: list[object] = []
+    subscription = server.subscribe("/l", notified.append)
     assert subscription.wait(30)
     tool("rosparam", "set", "/l/b/c", "[1, 2]")
-    eventually(lambda: told and told[-1] == {"a": 1, "b": {"c": [1, 2]}})
+    eventually(lambda: notified and notified[-1] == {"a": 1, "b": {"c": [1, 2]}})
     tool("rosparam", "set", "/l", "5")
-    eventually(lambda: told[-1] == 5)
+    eventually(lambda: notified[-1] == 5)
     tool("rosparam", "delete", "/l")
-    eventually(lambda: told[-1] is None)
+    eventually(lambda: notified[-1] is None)
     assert "not set" in tool("rosparam", "get", "/l", status=1)
 
 
@@ -80,8 +80,8 @@ def test_rospy_reads_and_sets_with_us(server, node, rospy_peer):
     assert rospy_peer.call("get_param", name="/py/a", cached=True) == [1, "int"]
     server.set("/py/a", 2.0)
     eventually(lambda: rospy_peer.call("get_param", name="/py/a", cached=True) == [2.0, "float"])
-    told: list[object] = []
-    subscription = server.subscribe("/py", told.append)
+    notified: list[object] = []
+    subscription = server.subscribe("/py", notified.append)
     assert subscription.wait(30)
     rospy_peer.call("set_param", name="/py/b", value={"c": [True, "x"]})
     eventually(lambda: subscription.value == {"a": 2.0, "b": {"c": [True, "x"]}})
@@ -146,7 +146,7 @@ def test_another_nodes_parameters_are_seen_through_a_client(node, rospy_peer):
         assert events[1].deleted == ("arm/joints",)
 
 
-def test_a_parameter_that_is_missing_is_told_with_similar_ones(server):
+def test_missing_parameter_is_reported_with_similar_names(server):
     server.set("/robot/max_speed", 1)
     with pytest.raises(ParameterError, match=r"did you mean /robot/max_speed\?"):
         server.get("/robot/max_sped")
@@ -157,9 +157,9 @@ def test_a_master_that_is_killed_and_one_that_follows(start_master, connect, sta
     node = connect("watcher", url=master.url)
     server = node.parameter_server
     server.set("/a", 1)
-    told: list[object] = []
-    server.subscribe("/a", told.append)
-    eventually(lambda: told == [1])
+    notified: list[object] = []
+    server.subscribe("/a", notified.append)
+    eventually(lambda: notified == [1])
     master.kill()
     began = time.monotonic()
     with pytest.raises(ConnectionLostError, match=str(master.port)):
@@ -168,8 +168,8 @@ def test_a_master_that_is_killed_and_one_that_follows(start_master, connect, sta
     with pytest.raises(ConnectionLostError):
         promise.result(30)
     assert time.monotonic() - began < 5
-    assert told == [1]
+    assert notified == [1]
     master.start()
-    eventually(lambda: told == [1, None])
+    eventually(lambda: notified == [1, None])
     start_rospy("setter", master=master).call("set_param", name="/a", value="new")
-    eventually(lambda: told == [1, None, "new"])
+    eventually(lambda: notified == [1, None, "new"])

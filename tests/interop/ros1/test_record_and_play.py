@@ -58,8 +58,8 @@ def recording(request, connect, rospy_peer, tmp_path) -> Path:
 def test_recordings_are_read_by_others_and_by_us(recording, tool):
     texts = [f"rospy {number}" for number in range(5)] + [f"ours {number}" for number in range(5)]
     if recording.suffix == ".bag":
-        told = tool("rosbag", "info", str(recording))
-        lines = [line.split() for line in told.splitlines()]
+        info = tool("rosbag", "info", str(recording))
+        lines = [line.split() for line in info.splitlines()]
         assert ["messages:", "11"] in lines
         assert ["/words", "10", "msgs", ":", STRING, "(2", "connections)"] in lines
         assert any(line[-5:] == ["/map", "1", "msg", ":", GRID] for line in lines)
@@ -111,19 +111,19 @@ def test_a_recording_plays_to_rospy_as_it_was(recording, connect, rospy_peer):
     rospy_peer.call("subscribe", topic="/words", type=STRING)
     with open_bag(recording) as bag, Player(node, bag, delay=0, paused=True) as player:
         assert not player.problems
-        # rospy counts connections that it is still making: the player's side tells.
+        # rospy counts connections that it is still making: the player's count is right.
         eventually(node.create_publisher("/words", STRING).subscription_count)
         player.resume()
-        told = [rospy_peer.event("received") for _ in range(10)]
+        received = [rospy_peer.event("received") for _ in range(10)]
         # The map was sent before rospy asks for it.
         rospy_peer.call("subscribe", topic="/map", type=GRID)
         grid = rospy_peer.event("received")
         assert player.wait(30)
-    assert [each["value"]["data"] for each in told] == [
+    assert [each["value"]["data"] for each in received] == [
         *(f"rospy {number}" for number in range(5)),
         *(f"ours {number}" for number in range(5)),
     ]
-    assert told[0]["header"]["md5sum"] == rosglass.load(STRING, ros=1).md5
+    assert received[0]["header"]["md5sum"] == rosglass.load(STRING, ros=1).md5
     assert grid["value"]["data"] == CELLS["data"]
     assert grid["header"]["latching"] == "1"
     for topic in ("/words", "/map"):
@@ -188,7 +188,7 @@ def test_the_clock_of_a_recording_drives_rospy(connect, start_master, start_rosp
 
 @pytest.mark.parametrize("name", ["sealed.bag", "sealed.mcap"])
 @pytest.mark.parametrize("text", ["", "what is this?\n", "uint8 other\n"])
-def test_what_comes_without_its_definition_is_kept_and_played_as_bytes(
+def test_messages_without_definition_are_recorded_and_played_as_bytes(
     name, text, connect, tmp_path
 ):
     kind = OpaqueType("sealed_msgs/msg/Box", "a" * 32, text=text, ros=1)
@@ -277,7 +277,7 @@ def test_all_topics_are_recorded_whatever_their_names(connect, start_master, tmp
         ("no/where.bag", "", "make the folder"),
     ],
 )
-def test_what_cannot_be_written_is_refused(connect, tmp_path, name, compression, reason):
+def test_invalid_recording_is_refused(connect, tmp_path, name, compression, reason):
     (tmp_path / "there.bag").write_text("mine")
     with pytest.raises(BagError, match=reason):
         Recorder(connect("ears"), tmp_path / name, compression=compression)

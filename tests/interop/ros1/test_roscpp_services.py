@@ -27,13 +27,13 @@ def test_rostopic_echo_shows_what_we_log(node, start_tool):
         return "---\n" in echo.output
 
     eventually(is_shown, timeout=20, what=lambda: "".join(echo.output))
-    told = "".join(echo.output)
-    assert "level: 4\n" in told
-    assert 'name: "/ops/cockpit"\n' in told
-    assert "battery at 5 %: Gr" in told
-    assert f'file: "{__file__}"\n' in told
-    assert 'function: "is_shown"\n' in told
-    assert "topics: \n  - /rosout\n" in told
+    printed = "".join(echo.output)
+    assert "level: 4\n" in printed
+    assert 'name: "/ops/cockpit"\n' in printed
+    assert "battery at 5 %: Gr" in printed
+    assert f'file: "{__file__}"\n' in printed
+    assert 'function: "is_shown"\n' in printed
+    assert "topics: \n  - /rosout\n" in printed
 
 
 def test_the_first_message_is_not_lost(connect, start_rospy, master):
@@ -52,17 +52,17 @@ def test_the_first_message_is_not_lost(connect, start_rospy, master):
 
 def test_rosservice_and_rosconsole_see_and_set_our_levels(node, tool):
     node.logger.getChild("gripper")
-    told = tool("rosservice", "call", "/ops/cockpit/get_loggers")
-    assert 'name: "ros.ops.cockpit"\n    level: "info"' in told
+    loggers = tool("rosservice", "call", "/ops/cockpit/get_loggers")
+    assert 'name: "ros.ops.cockpit"\n    level: "info"' in loggers
     assert "ros.ops.cockpit.gripper" in tool("rosconsole", "list", "/ops/cockpit")
     tool("rosconsole", "set", "/ops/cockpit", "ros.ops.cockpit.gripper", "debug")
     assert node.logger.getChild("gripper").isEnabledFor(logging.DEBUG)
     assert not node.logger.isEnabledFor(logging.DEBUG)
     assert "debug" in tool("rosconsole", "get", "/ops/cockpit", "ros.ops.cockpit.gripper")
     refused = tool(
-        "rosservice", "call", "/ops/cockpit/set_logger_level", "nobody", "info", status=None
+        "rosservice", "call", "/ops/cockpit/set_logger_level", "unused", "info", status=None
     )
-    assert "no logger 'nobody'; one of ros.ops.cockpit" in refused
+    assert "no logger 'unused'; one of ros.ops.cockpit" in refused
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_we_hear_the_log_and_see_the_levels_of_others(node, request, kind, logge
 
 
 def test_we_set_the_levels_of_others(node, rospy_peer):
-    # Not of a roscpp node: Debian 12's dies of it (SIGSEGV), whoever calls.
+    # Not of a roscpp node: Debian 12's dies of it (SIGSEGV), with any caller.
     change = node.create_service_client("/rospy_peer/set_logger_level", "roscpp/SetLoggerLevel")
     change.call({"logger": "rosout", "level": "DEBUG"}, timeout=30)
     assert rospy_peer.call("log_level") == "DEBUG"

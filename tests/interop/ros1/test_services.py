@@ -65,7 +65,7 @@ def test_services_without_fields_are_called(peer, node, name, persistent):
     assert [client.call().to_dict() for _ in range(3)] == [{}] * 3
 
 
-def test_what_every_roscpp_node_offers_is_called(start_roscpp, node):
+def test_built_in_services_of_roscpp_nodes_are_called(start_roscpp, node):
     # In a node of its own: Debian's roscpp 1.15.15 crashes when it logs an error afterwards.
     start_roscpp("talkative")
     client = node.create_service_client("/talkative/get_loggers")
@@ -86,7 +86,7 @@ def test_large_requests_and_responses_are_whole(rospy_peer, roscpp_peer, node):
 
 
 @pytest.mark.parametrize(
-    ("which", "fails", "told"),
+    ("which", "fails", "message"),
     [
         ("rospy", "exception", "error processing request: the arm is stuck"),
         ("rospy", "refusal", "service cannot process request: not homed"),
@@ -95,12 +95,12 @@ def test_large_requests_and_responses_are_whole(rospy_peer, roscpp_peer, node):
         ("roscpp", "false", "reports a failure without a reason"),
     ],
 )
-def test_their_failures_are_told(request, node, name, persistent, which, fails, told):
+def test_failures_of_peers_are_reported(request, node, name, persistent, which, fails, message):
     peer = request.getfixturevalue(f"{which}_peer")
     peer.call("serve", service=name, type=BOOL, fails=fails)
     client = node.create_service_client(name, BOOL, persistent=persistent)
     for _ in range(2):
-        with pytest.raises(rosglass.ServiceError, match=told) as caught:
+        with pytest.raises(rosglass.ServiceError, match=message) as caught:
             client.call()
         assert type(caught.value) is rosglass.ServiceError
 
@@ -157,13 +157,13 @@ def test_a_server_that_is_killed_in_mid_call_and_started_again(start_peer, node,
 
 def test_readiness_follows_their_server(peer, node, name):
     client = node.create_service_client(name, BOOL)
-    told = []
-    client.on_ready_change(told.append)
+    changes = []
+    client.on_ready_change(changes.append)
     assert not client.wait_for_server(0.3)
     peer.call("serve", service=name, type=BOOL, returns=DONE)
     assert client.wait_for_server(30)
     peer.call("unserve", service=name)
-    eventually(lambda: told == [True, False], what=lambda: f"{told} {client.problem}")
+    eventually(lambda: changes == [True, False], what=lambda: f"{changes} {client.problem}")
     eventually(lambda: f"no server offers {name}" in client.problem)  # unregistered, too
 
 
@@ -222,22 +222,22 @@ def test_our_service_is_called_by_many_at_once(connect, name, rospy_peer):
 
 
 @pytest.mark.parametrize("persistent", [False, True])
-def test_our_failures_are_told_to_them(connect, name, peer, persistent):
+def test_our_failures_are_reported_to_peers(connect, name, peer, persistent):
     def answer(request):
         raise ValueError("the arm is stuck")
 
     with connect("robot").create_service_server(name, TRIGGER, answer):
         answers = peer.call("call", service=name, type=TRIGGER, persistent=persistent, count=2)
-    if answers != [False, False]:  # roscpp logs the text, and tells its caller no more
-        assert all("error processing request: the arm is stuck" in told for told in answers)
+    if answers != [False, False]:  # roscpp logs the text, and its caller gets False only
+        assert all("error processing request: the arm is stuck" in answer for answer in answers)
 
 
-def test_they_are_told_that_our_definition_is_another(ours, rospy_peer, roscpp_peer, node):
+def test_peers_get_the_reason_of_a_definition_mismatch(ours, rospy_peer, roscpp_peer, node):
     name, _ = ours
-    (told,) = rospy_peer.call("call", service=name, type=TRIGGER)
+    (message,) = rospy_peer.call("call", service=name, type=TRIGGER)
     for kind in (BOOL, TRIGGER):
-        assert rosglass.load(kind, ros=1).md5 in told
-    assert f"{name} is std_srvs/SetBool" in told
+        assert rosglass.load(kind, ros=1).md5 in message
+    assert f"{name} is std_srvs/SetBool" in message
     assert roscpp_peer.call("call", service=name, type=TRIGGER) == [False]
 
 
@@ -290,8 +290,8 @@ def test_rosservice_prints_our_failure(connect, tool, name):
 
     with connect("robot").create_service_server(name, TRIGGER, answer):
         eventually(lambda: name in tool("rosservice", "list").split())
-        told = tool("rosservice", "call", name, status=None)
-    assert "service cannot process request: not homed" in told
+        output = tool("rosservice", "call", name, status=None)
+    assert "service cannot process request: not homed" in output
 
 
 def test_rosnode_shows_our_services(ours, tool):

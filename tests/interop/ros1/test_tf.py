@@ -41,12 +41,12 @@ def test_a_robot_that_sends(connect: Any, rospy_peer: Any) -> None:
     promise = buffer.lookup_transform_async("map", "camera")
     numbers = itertools.count(1)
 
-    def found_meanwhile() -> bool:
+    def found_while_sending() -> bool:
         moving = [place("map", "base", 3.0, next(numbers)).to_dict(1)]
         rospy_peer.call("tf_send", transforms=moving)
         return promise.done()
 
-    eventually(found_meanwhile)
+    eventually(found_while_sending)
     found = promise.result(30)
     assert found.translation == pytest.approx((3, 1, 0))
     assert found.rotation == pytest.approx((0, 0, 1, 0))
@@ -78,7 +78,9 @@ def test_a_robot_that_listens(connect: Any, rospy_peer: Any) -> None:
     assert value["value"]["transform"]["translation"]["y"] == pytest.approx(4)
 
 
-def test_several_broadcasters_are_heard_by_who_comes_late(connect: Any, start_rospy: Any) -> None:
+def test_static_transforms_of_several_broadcasters_reach_late_listeners(
+    connect: Any, start_rospy: Any
+) -> None:
     node = connect("several")
     first, second = StaticTransformBroadcaster(node), StaticTransformBroadcaster(node)
     first.send_transform(place("base", "left", 1.0))

@@ -21,9 +21,9 @@ def test_rostopic_list_and_info_show_our_topics(node, tool, master):
     assert "* /ops/speed [std_msgs/Float64] 1 publisher" in listed
     assert "* /ops/orders [std_msgs/String] 1 subscriber" in listed
     assert tool("rostopic", "type", "/ops/speed") == "std_msgs/Float64\n"
-    told = tool("rostopic", "info", "/ops/speed")
-    assert "Type: std_msgs/Float64" in told
-    assert "* /ops/cockpit (http://127.0.0.1:" in told
+    info = tool("rostopic", "info", "/ops/speed")
+    assert "Type: std_msgs/Float64" in info
+    assert "* /ops/cockpit (http://127.0.0.1:" in info
     assert tool("rostopic", "find", "std_msgs/Float64") == "/ops/speed\n"
 
 
@@ -45,8 +45,8 @@ def test_rostopic_hz_and_bw_measure_us(node, start_tool):
 
     def measured():
         publisher.publish(data="x" * 100)
-        told = "".join(rate.output), "".join(bandwidth.output)
-        return "average rate: " in told[0] and "average: " in told[1]
+        printed = "".join(rate.output), "".join(bandwidth.output)
+        return "average rate: " in printed[0] and "average: " in printed[1]
 
     eventually(measured, timeout=20, what=lambda: "".join(rate.output + bandwidth.output))
 
@@ -77,14 +77,14 @@ def test_rosnode_lists_pings_and_shows_our_node(node, tool):
     assert "xmlrpc reply from http://127.0.0.1:" in tool(
         "rosnode", "ping", "-c", "1", "/ops/cockpit"
     )
-    told = tool("rosnode", "info", "/ops/cockpit")
-    assert " * /ops/speed [std_msgs/Float64]" in told
-    assert " * /ops/commands [unknown type]" in told  # it asks for published types only
-    assert "Pid: " in told
-    assert "* topic: /ops/speed" in told
-    assert "transport: TCPROS" in told
-    assert "* direction: outbound" in told
-    assert "* direction: inbound" in told
+    info = tool("rosnode", "info", "/ops/cockpit")
+    assert " * /ops/speed [std_msgs/Float64]" in info
+    assert " * /ops/commands [unknown type]" in info  # it asks for published types only
+    assert "Pid: " in info
+    assert "* topic: /ops/speed" in info
+    assert "transport: TCPROS" in info
+    assert "* direction: outbound" in info
+    assert "* direction: inbound" in info
 
 
 def test_rosnode_kill_ends_our_node_only(connect, tool):
@@ -123,9 +123,9 @@ def test_rosbag_records_us_and_plays_to_us(node, start_tool, tool, tmp_path):
         if number:
             map_.publish(grid)
     recorder.popen.wait(30)
-    told = tool("rosbag", "info", str(bag))
-    assert "messages:    10" in told
-    assert "nav_msgs/OccupancyGrid" in told
+    info = tool("rosbag", "info", str(bag))
+    assert "messages:    10" in info
+    assert "nav_msgs/OccupancyGrid" in info
     words.close()
     map_.close()
     subscription, latched = node.create_subscription("words"), node.create_subscription("map")

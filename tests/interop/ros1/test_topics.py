@@ -1,4 +1,4 @@
-"""Topics both ways with rospy and roscpp: every kind of field, latched ones, pictures of 6 MB."""
+"""Topics both ways with rospy and roscpp: every kind of field, latched ones, images of 6 MB."""
 
 from __future__ import annotations
 
@@ -132,12 +132,12 @@ def topic_of(direction: str, kind: str) -> str:
 
 
 def numbered(value: dict) -> dict:
-    """What arrives of a publisher's first message: publishers number headers themselves."""
+    """Return what is received of a publisher's first message: publishers number headers."""
     return value | {"header": value["header"] | {"seq": 1}} if "header" in value else value
 
 
 def roscpp_type(name: str) -> dict[str, str]:
-    """What roscpp has to be told about a type that it was not compiled with."""
+    """Return the arguments that roscpp needs for a type that it was not compiled with."""
     found = rosglass.load(name, ros=1)
     text = rosglass.interfaces.full_text(found.definition)
     return {"type": name, "md5": found.md5, "definition": text}
@@ -220,7 +220,7 @@ def test_roscpp_decodes_what_we_publish_with_its_own_classes(connect, roscpp_pee
         },
         "sensor_msgs/Image": IMAGE | {"data": bytes([7]) * SIZE},
     }
-    told = {
+    expected = {
         "std_msgs/String": "Grüße",
         "geometry_msgs/PoseStamped": {
             "frame_id": "map", "sec": 12, "nsec": 34, "x": 1.5, "w": 1.0,
@@ -232,7 +232,7 @@ def test_roscpp_decodes_what_we_publish_with_its_own_classes(connect, roscpp_pee
         node.create_publisher(topic, name, rosglass.QoS.latched()).publish(value)
         roscpp_peer.call("subscribe", topic=topic, type=name)
         received = roscpp_peer.event("received")
-        assert (received["topic"], received["value"]) == (topic, told[name])
+        assert (received["topic"], received["value"]) == (topic, expected[name])
 
 
 def test_pictures_of_six_megabytes_arrive_whole_both_ways(connect, rospy_peer, roscpp_peer):

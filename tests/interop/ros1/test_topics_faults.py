@@ -36,7 +36,7 @@ def answer_of(sock):
     return parse_header(sock.recv(size, socket.MSG_WAITALL))
 
 
-def test_a_publisher_that_is_killed_is_told_of_and_replaced(connect, start_rospy):
+def test_killed_publisher_is_reported_and_replaced(connect, start_rospy):
     node = connect("follower")
     subscription = node.create_subscription("/killed", STRING)
     plan = {"topic": "/killed", "type": STRING, "rate": 50, "count": 0}
@@ -103,7 +103,7 @@ def test_subscribers_that_come_and_go_between_two_looks_are_not_missed(connect):
             eventually(lambda: publisher.subscription_count() == 1)
         go_on.set()
         eventually(lambda: len(changes) == 7, what=lambda: changes)
-        # The look that reports it has been; whoever listens from now on is told first who is there.
+        # The check that reports it is over; a new listener is first notified of what is there.
         held.clear(), go_on.clear()
         with dial(node, "/brief", md5sum="*", type="*"):
             assert held.wait(30)
@@ -117,7 +117,7 @@ def test_subscribers_that_come_and_go_between_two_looks_are_not_missed(connect):
     assert changes == [(1, 1), *4 * [(1, 2), (-1, 1)], (-1, 0)]
 
 
-def test_a_slow_subscriber_is_told_of_and_holds_up_nobody(connect):
+def test_slow_subscriber_is_reported_and_does_not_block_others(connect):
     node, other = connect("fast"), connect("listener")
     publisher = node.create_publisher("/fast", "std_msgs/UInt8MultiArray", 5)
     slow = dial(node, "/fast", md5sum="*", type="*")
@@ -149,7 +149,7 @@ def test_garbage_is_hung_up_on_and_others_go_on(garbage, connect):
 
 
 @pytest.mark.parametrize(
-    ("fields", "told"),
+    ("fields", "reason"),
     [
         ({"type": STRING}, "no md5sum"),
         ({"md5sum": "0" * 32, "type": STRING}, f"md5 {'0' * 32}"),
@@ -157,14 +157,14 @@ def test_garbage_is_hung_up_on_and_others_go_on(garbage, connect):
         ({"topic": "/nowhere", "md5sum": "*"}, "does not publish /nowhere"),
     ],
 )
-def test_a_header_that_will_not_do_is_refused_by_name(fields, told, connect):
+def test_insufficient_header_is_refused_by_name(fields, reason, connect):
     node = connect("strict")
     publisher = node.create_publisher("/strict", STRING)
     with dial(node, "/strict", **fields) as sock:
-        assert told in answer_of(sock)["error"]
+        assert reason in answer_of(sock)["error"]
         assert sock.recv(10) == b""
     if "topic" not in fields:
-        eventually(lambda: told in publisher.problem)
+        eventually(lambda: reason in publisher.problem)
 
 
 def test_an_md5_mismatch_names_both_definitions(connect):
@@ -173,13 +173,13 @@ def test_an_md5_mismatch_names_both_definitions(connect):
     ours = MessageType.from_text("test_msgs/msg/Other", "int32 ours\n", ros=1)
     other.create_publisher("/mismatch", theirs)
     subscription = node.create_subscription("/mismatch", ours)
-    told = eventually(lambda: subscription.problem)
+    problem = eventually(lambda: subscription.problem)
     for part in (theirs.md5, ours.md5, "int32 theirs", "int32 ours", "/theirs"):
-        assert part in told
+        assert part in problem
     assert subscription.publisher_count() == 0
 
 
-def test_what_nobody_can_define_is_passed_on_as_it_came(connect):
+def test_undefinable_messages_are_relayed_as_bytes(connect):
     source, relay, sink = connect("source"), connect("relay"), connect("sink")
     secret = OpaqueType("secret_msgs/Thing", "a" * 32, text="no definition {", ros=1)
     sent = source.create_publisher("/secret", secret, rosglass.QoS.latched())
@@ -203,7 +203,7 @@ def test_a_definition_with_a_broken_line_is_used_if_the_rest_has_its_md5(connect
     assert sink.create_subscription("/broken").wait(30).message().data == 2.5
 
 
-def test_each_latched_publisher_of_a_node_is_heard_by_who_comes_late(connect):
+def test_latched_messages_of_each_publisher_of_a_node_reach_late_subscriptions(connect):
     node = connect("static")
     first = node.create_publisher("/static", STRING, rosglass.QoS.latched())
     second = node.create_publisher("/static", STRING, rosglass.QoS.latched())
@@ -278,11 +278,11 @@ def test_closing_while_connecting(connect, start_master):
     publisher.close()
 
 
-def test_a_host_name_that_is_unknown_is_told_with_the_remedy(connect, master):
+def test_unresolvable_host_name_is_reported_with_the_fix(connect, master):
     node = connect("lost")
     subscription = node.create_subscription("/unknown_host")
     eventually(lambda: ["/unknown_host", ["/lost"]] in master.call("getSystemState")[1])
     master.call("registerPublisher", "/unknown_host", STRING, "http://no-such-host.invalid:1/")
-    told = eventually(lambda: subscription.problem)
-    assert "no-such-host.invalid" in told
-    assert "ROS_HOSTNAME" in told
+    problem = eventually(lambda: subscription.problem)
+    assert "no-such-host.invalid" in problem
+    assert "ROS_HOSTNAME" in problem

@@ -32,7 +32,7 @@ def check(seen: dict[str, Any]) -> None:
     assert seen["problems"] == ["", ""]
 
 
-def test_who_drives_through_an_outage_stops_the_robot_after_it(outage: Any) -> None:
+def test_driving_operator_can_stop_the_robot_after_an_outage(outage: Any) -> None:
     seen = outage("teleop", 6)
     check(seen)
     # What was sent within half a second was under way; what came after made room for the stop.

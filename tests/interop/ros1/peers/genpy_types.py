@@ -107,8 +107,8 @@ def main():
             build(kind, value).serialize(buffer)
             data = base64.b64encode(buffer.getvalue()).decode()
             samples.append({"value": value, "data": data})
-        told = {"type": kind._type, "md5": kind._md5sum, "text": kind._full_text}
-        print(json.dumps({"type": told, "samples": samples}))
+        described = {"type": kind._type, "md5": kind._md5sum, "text": kind._full_text}
+        print(json.dumps({"type": described, "samples": samples}))
     print(json.dumps({"end": True}))
 
 

@@ -170,21 +170,21 @@ const Request send("send_goal", [](const Plan &plan) {
                               wanted,
                               [key](Client::GoalHandle changed) {
                                 const auto state = changed.getCommState();
-                                std::map<std::string, std::string> told{
+                                std::map<std::string, std::string> fields{
                                     {"state", quoted(state.toString())}};
                                 if (state == actionlib::CommState::DONE) {
                                   const auto end = changed.getTerminalState();
                                   const auto result = changed.getResult();
-                                  told["terminal"] = quoted(end.toString());
-                                  told["text"] = quoted(end.getText());
-                                  told["result"] =
+                                  fields["terminal"] = quoted(end.toString());
+                                  fields["text"] = quoted(end.getText());
+                                  fields["result"] =
                                       result ? std::to_string(result->result) : "null";
                                 }
-                                tell("state " + key, object(told));
+                                report("state " + key, object(fields));
                               },
                               [key](Client::GoalHandle,
                                     const actionlib::TestFeedbackConstPtr &feedback) {
-                                tell("feedback " + key, std::to_string(feedback->feedback));
+                                report("feedback " + key, std::to_string(feedback->feedback));
                               });
   const std::lock_guard<std::mutex> guard(lock);
   goals[key] = handle;

@@ -7,7 +7,7 @@ namespace {
 
 std::map<std::string, ros::Subscriber> subscribers;
 
-/// topic, fallback: subscribe by UDP, or by TCP where that is refused; tells "udp": text.
+/// topic, fallback: subscribe by UDP, or by TCP where that is refused; reports "udp": text.
 Request subscribe_udp("subscribe_udp", [](const Plan &plan) -> std::string {
   const auto topic = plan.get<std::string>("topic");
   auto hints = ros::TransportHints().unreliable();
@@ -15,7 +15,7 @@ Request subscribe_udp("subscribe_udp", [](const Plan &plan) -> std::string {
     hints = hints.reliable();
   }
   const boost::function<void(const std_msgs::String::ConstPtr &)> callback =
-      [](const std_msgs::String::ConstPtr &message) { tell("udp", quoted(message->data)); };
+      [](const std_msgs::String::ConstPtr &message) { report("udp", quoted(message->data)); };
   subscribers[topic] =
       node().subscribe<std_msgs::String>(topic, 10, callback, ros::VoidConstPtr(), hints);
   return "null";

@@ -22,16 +22,16 @@ void obey(const Plan &plan) {
   const auto number = plan.get<std::string>("number");
   try {
     const auto answer = requests().at(plan.get<std::string>("do"))(plan);
-    tell("answer " + number, object({{"value", answer}}));
+    report("answer " + number, object({{"value", answer}}));
   } catch (const std::exception &error) {
-    tell("answer " + number, object({{"error", quoted(error.what())}}));
+    report("answer " + number, object({{"error", quoted(error.what())}}));
   }
 }
 }  // namespace
 
 Request::Request(const std::string &name, Handler handler) { requests()[name] = handler; }
 
-void tell(const std::string &event, const std::string &json) {
+void report(const std::string &event, const std::string &json) {
   const std::lock_guard<std::mutex> guard(output);
   std::cout << object({{event, json}}) << std::endl;
 }
@@ -69,7 +69,7 @@ int main(int argc, char **argv) {
   handle = std::make_unique<ros::NodeHandle>();
   ros::AsyncSpinner spinner(4);
   spinner.start();
-  tell("ready", "true");
+  report("ready", "true");
   std::string line;
   while (std::getline(std::cin, line)) {
     std::istringstream text(line);

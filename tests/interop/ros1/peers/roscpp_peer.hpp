@@ -19,7 +19,7 @@ struct Request {
 };
 
 /// Prints the line {"event": value} in one piece; `json` is JSON already.
-void tell(const std::string &event, const std::string &json);
+void report(const std::string &event, const std::string &json);
 
 /// Returns `text` as a JSON string.
 std::string quoted(const std::string &text);

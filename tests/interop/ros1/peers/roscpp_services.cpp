@@ -21,7 +21,7 @@ bool proceed(const Plan &plan) {
   return fails.empty();
 }
 
-/// service, type, fails (`exception`, `false`), delay in seconds; told as `served`.
+/// service, type, fails (`exception`, `false`), delay in seconds; reported as `served`.
 Request serve("serve", [](const Plan &plan) -> std::string {
   const auto name = plan.get<std::string>("service");
   const auto type = plan.get<std::string>("type");
@@ -29,8 +29,8 @@ Request serve("serve", [](const Plan &plan) -> std::string {
     using Service = std_srvs::SetBool;
     const boost::function<bool(Service::Request &, Service::Response &)> answer =
         [plan, name](Service::Request &request, Service::Response &response) {
-          tell("served", object({{"service", quoted(name)},
-                                 {"request", request.data ? "true" : "false"}}));
+          report("served", object({{"service", quoted(name)},
+                                   {"request", request.data ? "true" : "false"}}));
           response.success = request.data;
           response.message = std::string(plan.get<size_t>("length", 2), 'o');
           return proceed(plan);
@@ -40,7 +40,7 @@ Request serve("serve", [](const Plan &plan) -> std::string {
     using Service = std_srvs::Empty;
     const boost::function<bool(Service::Request &, Service::Response &)> answer =
         [plan, name](Service::Request &, Service::Response &) {
-          tell("served", object({{"service", quoted(name)}}));
+          report("served", object({{"service", quoted(name)}}));
           return proceed(plan);
         };
     servers[name] = node().advertiseService<Service::Request, Service::Response>(name, answer);

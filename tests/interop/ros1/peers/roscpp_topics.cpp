@@ -91,9 +91,9 @@ std::string header_of(const ros::M_string &header) {
 
 void received(const std::string &topic, const ros::M_string &header, const std::string &value) {
   ++counts[topic];
-  tell("received", object({{"topic", quoted(topic)},
-                           {"value", value},
-                           {"header", header_of(header)}}));
+  report("received", object({{"topic", quoted(topic)},
+                             {"value", value},
+                             {"header", header_of(header)}}));
 }
 
 template <typename T, typename Show>
@@ -139,7 +139,7 @@ Request connections("connections", [](const Plan &plan) {
   return std::to_string(publishers.at(plan.get<std::string>("topic")).getNumSubscribers());
 });
 
-/// type: `*` (told in hexadecimal), std_msgs/String, geometry_msgs/PoseStamped, sensor_msgs/Image.
+/// type: `*` (in hexadecimal), std_msgs/String, geometry_msgs/PoseStamped, sensor_msgs/Image.
 Request subscribe("subscribe", [](const Plan &plan) -> std::string {
   const auto topic = plan.get<std::string>("topic");
   const auto type = plan.get<std::string>("type", "*");

@@ -1,6 +1,6 @@
 """Requests about actions of the type actionlib/Test.
 
-A goal of n above 0 tells 0 to n - 1 as feedback, one each 20 ms, and succeeds with n as its result.
+A goal of n above 0 sends 0 to n - 1 as feedback, one each 20 ms, and succeeds with n as its result.
 0 is rejected, -1 aborts, -2 stays pending; one that is cancelled ends with what it has done.
 """
 
@@ -27,7 +27,7 @@ class _Server:
         self.stopped[handle.get_goal_id().id].set()
 
     def work(self, handle, stop):
-        with contextlib.suppress(rospy.ROSException):  # the server was withdrawn meanwhile
+        with contextlib.suppress(rospy.ROSException):  # the server was withdrawn before it ended
             self.execute(handle, stop)
 
     def execute(self, handle, stop):
@@ -79,7 +79,7 @@ def do_stop_action_server(peer, name):
 
 
 def do_wait_for_client(peer, name):
-    """Wait until feedback and results go to somebody; before, rospy drops what is published."""
+    """Wait until feedback and results have a subscriber; before, rospy drops published messages."""
     server = peer.kept["action server", name].server
     for publisher in (server.feedback_pub, server.result_pub):
         while not publisher.get_num_connections():
@@ -99,20 +99,20 @@ def do_wait_for_server(peer, name, timeout=30.0):
 
 
 def do_send_goal(peer, name, goal, key):
-    """Send a goal, and tell its states (`state KEY`) and feedback (`feedback KEY`)."""
+    """Send a goal, and report its states (`state KEY`) and feedback (`feedback KEY`)."""
 
     def changed(handle):
         state = handle.get_comm_state()
-        told = {"state": actionlib.CommState.to_string(state)}
+        report = {"state": actionlib.CommState.to_string(state)}
         if state == actionlib.CommState.DONE:
             result = handle.get_result()
-            told["terminal"] = GoalStatus.to_string(handle.get_terminal_state())
-            told["text"] = handle.get_goal_status_text()
-            told["result"] = None if result is None else result.result
-        peer.tell(**{f"state {key}": told})
+            report["terminal"] = GoalStatus.to_string(handle.get_terminal_state())
+            report["text"] = handle.get_goal_status_text()
+            report["result"] = None if result is None else result.result
+        peer.report(**{f"state {key}": report})
 
     def fed(handle, feedback):
-        peer.tell(**{f"feedback {key}": feedback.feedback})
+        peer.report(**{f"feedback {key}": feedback.feedback})
 
     client = _client(peer, name)
     peer.kept["goal", key] = client.send_goal(TestGoal(goal), changed, fed)

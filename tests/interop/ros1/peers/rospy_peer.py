@@ -13,7 +13,7 @@ import rospy
 
 
 class Peer:
-    """What the modules of requests share."""
+    """The state that the modules of requests share."""
 
     def __init__(self):
         self._lock = threading.Lock()
@@ -26,7 +26,7 @@ class Peer:
                     if name.startswith("do_"):
                         self.requests[name[3:]] = function
 
-    def tell(self, **event):
+    def report(self, **event):
         """Print one line in one piece: requests run on threads."""
         line = json.dumps(event) + "\n"
         with self._lock:
@@ -51,14 +51,14 @@ class Peer:
             answer = {"value": self.requests[do](self, **plan)}
         except Exception:
             answer = {"error": traceback.format_exc()}
-        self.tell(**{f"answer {number}": answer})
+        self.report(**{f"answer {number}": answer})
 
 
 def main():
     name = sys.argv[1]
     peer = Peer()
     rospy.init_node(name, argv=sys.argv[2:], disable_signals=True)
-    peer.tell(ready=True)
+    peer.report(ready=True)
     for line in sys.stdin:
         threading.Thread(target=peer.obey, kwargs=json.loads(line), daemon=True).start()
     rospy.signal_shutdown("the test is done")

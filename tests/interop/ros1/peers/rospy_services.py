@@ -9,11 +9,11 @@ import rospy
 
 
 def do_serve(peer, service, type, returns=None, fails="", delay=0.0):
-    """Offer a service that answers `returns`; each request is told as `served`."""
+    """Offer a service that answers `returns`; each request is reported as `served`."""
 
     def answer(request):
-        told = peer.plain(request) if len(repr(request)) < 1000 else None
-        peer.tell(served={"service": service, "request": told})
+        content = peer.plain(request) if len(repr(request)) < 1000 else None
+        peer.report(served={"service": service, "request": content})
         time.sleep(delay)
         if fails == "exception":
             raise ValueError("the arm is stuck")

@@ -62,8 +62,8 @@ def do_connections(peer, topic):
     return peer.kept["publisher", topic].get_num_connections()
 
 
-def do_subscribe(peer, topic, type="*", tell=True, **more):
-    """Subscribe, and tell each message: topic, value, raw bytes in base64, connection header.
+def do_subscribe(peer, topic, type="*", reports=True, **more):
+    """Subscribe, and report each message: topic, value, raw bytes in base64, connection header.
 
     Large messages come without raw bytes.
     """
@@ -72,10 +72,10 @@ def do_subscribe(peer, topic, type="*", tell=True, **more):
 
     def received(message):
         counts[0] += 1
-        if not tell:
+        if not reports:
             return
         raw = message._buff if type == "*" else None
-        peer.tell(
+        peer.report(
             received={
                 "topic": topic,
                 "value": None if type == "*" else peer.plain(message),

@@ -3,7 +3,7 @@
 ``two_machines_ros1.py teleop|command|idle SECONDS HOME``, to be run as root of a network namespace,
 which is the operator's. The cable is unplugged for so long, while the operator drives, by a profile
 for commands or another, or says nothing.
-Then the robot is told to stop. Prints what it got, and what the operator saw.
+Then the operator sends a stop. Prints what the robot received, and what the operator saw.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ MASTER, PORT = f"http://{THERE}:11311", "11311"
 ROBOT = """
 import sys, time, rospy, std_msgs.msg, geometry_msgs.msg, std_srvs.srv
 rospy.init_node("robot")
-told = open(sys.argv[1], "w", buffering=1)
+log = open(sys.argv[1], "w", buffering=1)
 def drive(message):
-    told.write("%f %f\\n" % (time.time(), message.linear.x))
+    log.write("%f %f\\n" % (time.time(), message.linear.x))
 rospy.Subscriber("/cmd_vel", geometry_msgs.msg.Twist, drive)
 rospy.Service("/stop", std_srvs.srv.SetBool, lambda r: std_srvs.srv.SetBoolResponse(r.data, ""))
 words = rospy.Publisher("/word", std_msgs.msg.String, queue_size=10)
