@@ -91,7 +91,7 @@ def pytest_report_header() -> str:
 
 @pytest.fixture(scope="module")
 def dds_domain(ros_domains: list[int]) -> int:
-    """A ROS domain for the tests of a module, most likely nobody else's on this machine."""
+    """A ROS domain for the tests of a module, most likely unused on this machine."""
     return random.SystemRandom().choice(ros_domains)
 
 

@@ -110,7 +110,7 @@ def test_lists(run: Any) -> None:
     ]
 
 
-def test_what_does_not_match_is_shown(run: Any) -> None:
+def test_mismatches_are_shown(run: Any) -> None:
     _, out, _ = run("topic", "info", "/lab/mixed")
     assert "types differ" in out
     _, out, _ = run("topic", "info", "/lab/weak")
@@ -289,8 +289,8 @@ def test_parameters(run: Any, robot: Node, tmp_path: Path) -> None:
     assert "; did you mean speed?" in err
     code, _, err = run("param", "list", "/lab/robott", "--timeout", "4")
     assert code == 1
-    told = "rosglass: waiting: there is no node /lab/robott; did you mean /lab/robot?"
-    assert err.splitlines()[0] == told
+    message = "rosglass: waiting: there is no node /lab/robott; did you mean /lab/robot?"
+    assert err.splitlines()[0] == message
 
 
 def test_doctor(run: Any) -> None:
@@ -334,7 +334,7 @@ def test_waiting_says_for_what_and_ctrl_c_ends_it(start_command: Any) -> None:
     assert process.stderr.read() == ""
 
 
-def test_nobody_reads_any_more(start_command: Any) -> None:
+def test_echo_ends_with_its_reader(start_command: Any) -> None:
     process = start_command("topic", "echo", "/lab/map")
     process.stdout.readline()
     process.stdout.close()
@@ -424,7 +424,7 @@ def test_the_router_of_this_machine_is_used() -> None:
 
 
 @pytest.mark.usefixtures("nothing_said")
-def test_what_the_environment_says_is_not_overruled(
+def test_invalid_environment_is_not_overruled(
     run_command: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_email_cpp")

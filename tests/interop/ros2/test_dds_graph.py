@@ -97,7 +97,7 @@ def test_we_see_the_nodes_of_cyclone_dds(cyclone, dds_connect, width):
     assert [end.name for end in node.endpoints("/cyclone/adder")] == ["/add"]
 
 
-def test_who_leaves_is_gone_at_once(cyclone, dds_connect):
+def test_participant_that_leaves_disappears_at_once(cyclone, dds_connect):
     node = dds_connect("cockpit")
     peer = cyclone(**NODES)
     eventually(lambda: node.publishers("/chatter"))
@@ -108,7 +108,7 @@ def test_who_leaves_is_gone_at_once(cyclone, dds_connect):
     assert node.nodes() == [NodeName("/", "cockpit")]
 
 
-def test_who_is_killed_is_gone_with_the_lease(cyclone, dds_connect):
+def test_participant_that_is_killed_disappears_with_its_lease(cyclone, dds_connect):
     node = dds_connect("cockpit")
     peer = cyclone(SHORT_LEASE, **NODES)
     eventually(lambda: node.publishers("/chatter"))
@@ -127,15 +127,15 @@ def test_others_see_our_nodes_by_plain_cyclone_dds(cyclone, dds_connect):
     (reader,) = node.subscriptions("/heard")
     ours = {"writer": ("rt/ours/chatter", writer), "reader": ("rt/heard", reader)}
     for kind, (topic, endpoint) in ours.items():
-        told = event(observer, kind, lambda found, topic=topic: found["topic"] == topic)
-        assert told["type"] == "std_msgs::msg::dds_::String_"
-        assert told["guid"] == endpoint.gid.hex()
-        assert told["user_data"] == f"typehash={HASH};"
+        found = event(observer, kind, lambda found, topic=topic: found["topic"] == topic)
+        assert found["type"] == "std_msgs::msg::dds_::String_"
+        assert found["guid"] == endpoint.gid.hex()
+        assert found["user_data"] == f"typehash={HASH};"
     participant = writer.gid[:12].hex() + "000001c1"
     found = event(observer, "participant", lambda found: found["guid"] == participant)
     assert found["user_data"] == "enclave=/;client=rosglass;"
 
-    def told(**gids: bool) -> None:
+    def wait_listed(**gids: bool) -> None:
         """Wait until ros_discovery_info lists, or does not list, the identities."""
 
         def wanted(info: dict[str, Any]) -> bool:
@@ -146,11 +146,11 @@ def test_others_see_our_nodes_by_plain_cyclone_dds(cyclone, dds_connect):
 
         event(observer, "info", wanted)
 
-    told(reader=True, writer=True)
+    wait_listed(reader=True, writer=True)
     publisher.close()
-    told(reader=True, writer=False)
+    wait_listed(reader=True, writer=False)
     subscription.close()
-    told(reader=False, writer=False)
+    wait_listed(reader=False, writer=False)
     eventually(lambda: not {"/ours/chatter", "/heard"} & set(node.topics()))
 
 
@@ -198,7 +198,9 @@ def test_the_nodes_of_other_processes_change_without_asking(cyclone, dds_connect
     eventually(lambda: any(TALKER in nodes for nodes in seen))
 
 
-def test_rubbish_from_one_peer_is_named_once_and_disturbs_nobody(cyclone, dds_connect, caplog):
+def test_rubbish_of_one_peer_is_logged_once_and_does_not_affect_others(
+    cyclone, dds_connect, caplog
+):
     node = dds_connect("cockpit")
     cyclone(rubbish=True)
     cyclone(**NODES)
@@ -222,7 +224,7 @@ def test_without_multicast_the_programs_of_this_machine_find_each_other(start, d
         eventually(lambda: NodeName("/", "peer") in node.nodes())
 
 
-def test_with_discovery_off_nobody_is_seen(cyclone, dds_domain):
+def test_no_node_is_found_with_discovery_off(cyclone, dds_domain):
     cyclone(**NODES)
     # In a process of its own: a process has one configuration for a domain.
     code = (
@@ -231,8 +233,8 @@ def test_with_discovery_off_nobody_is_seen(cyclone, dds_domain):
         "time.sleep(1); print([str(name) for name in node.nodes()], node.status())"
     )
     command = [sys.executable, "-c", code]
-    told = subprocess.run(command, check=True, capture_output=True, text=True, timeout=30).stdout
-    assert told.startswith("['/alone'] CONNECTING: no other participant in DDS domain")
+    output = subprocess.run(command, check=True, capture_output=True, text=True, timeout=30).stdout
+    assert output.startswith("['/alone'] CONNECTING: no other participant in DDS domain")
 
 
 @pytest.mark.skipif(importlib.util.find_spec("dora") is None, reason="dora-rs is not installed")
@@ -271,7 +273,7 @@ def fastdds(fastdds_program, start_program, dds_domain):
     process.end()
 
 
-def test_what_fast_dds_has_shows_under_its_participant(fastdds, dds_connect):
+def test_endpoints_of_fast_dds_are_listed_under_their_participant(fastdds, dds_connect):
     node = dds_connect("cockpit")
     eventually(lambda: "/add" in node.services() and "/to/fast" in node.topics())
     eventually(lambda: node.publishers("/from/fast"))

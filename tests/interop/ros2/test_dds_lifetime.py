@@ -1,4 +1,4 @@
-"""DDS nodes come and go: nothing is left behind, and nothing hangs, whatever happens meanwhile."""
+"""DDS nodes come and go: nothing is left behind, and nothing hangs, at any moment."""
 
 from __future__ import annotations
 
@@ -65,9 +65,9 @@ for _ in range(7):
     print(len(tasks), len(files), pages * os.sysconf('SC_PAGE_SIZE') // 1024)
 """
     process = program(text, domain)
-    told, _ = process.communicate(timeout=240)
-    assert process.returncode == 0, told
-    counts = [line.split() for line in told.splitlines() if line[0].isdecimal()]
+    output, _ = process.communicate(timeout=240)
+    assert process.returncode == 0, output
+    counts = [line.split() for line in output.splitlines() if line[0].isdecimal()]
     _, first, *_, last = [[int(number) for number in count] for count in counts]
     threads, files, memory = (after - before for before, after in zip(first, last, strict=True))
     return threads, files, memory
@@ -159,7 +159,7 @@ def stuck(dds_connect, dds_domain):
     reader.wait()
 
 
-def test_a_publisher_that_waits_for_its_readers_stops_nobody_and_can_be_closed(stuck):
+def test_publisher_that_waits_for_its_readers_blocks_no_thread_and_can_be_closed(stuck):
     raised: list[Error] = []
     sent = [0]
 
@@ -217,10 +217,10 @@ while True:
     assert process.stdout.readline() == "publishing\n"
     time.sleep(1.0)
     process.send_signal(signal.SIGINT)
-    told, _ = process.communicate(timeout=60)
+    output, _ = process.communicate(timeout=60)
     reader.kill()
     reader.wait()
-    assert "KeyboardInterrupt" in told
+    assert "KeyboardInterrupt" in output
     assert process.returncode == -signal.SIGINT
 
 

@@ -37,7 +37,7 @@ SHORT_LEASE = (
     "</CycloneDDS>"
 )
 BIG = 1_000_000
-#: What peers on rosglass answer when they are told to.
+#: Requests that peers on rosglass answer on demand.
 LATER = -2
 
 pytestmark = pytest.mark.peers
@@ -61,7 +61,7 @@ def prefix(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def start_services(start, dds_domain, prefix, request):
-    """Start a peer of a kind with both services, or those it is told to serve."""
+    """Start a peer of a kind with both services, or with those given."""
 
     def start_services(kind: str, name: str, serve: Any = ("add", "blob"), config: str = "") -> Any:
         if kind == "dora" and importlib.util.find_spec("dora") is None:
@@ -156,7 +156,7 @@ def test_a_peer_calls_us_with_a_megabyte_each_way(peer, node, types):
 
 
 def test_a_peer_that_calls_us_is_killed(start_services, peer, node, types):
-    """Its reply reaches nobody, and the others' do."""
+    """Its reply is dropped, and the others' arrive."""
     requests: list[Any] = []
 
     def serve(request: Any) -> Any:
@@ -181,7 +181,7 @@ def test_a_peer_that_calls_us_is_killed(start_services, peer, node, types):
 
 
 def test_the_first_request_of_a_new_rclpy_client_is_answered(start_rclpy, node):
-    # Fast DDS tells of a client's writer at the same moment as it sends the first request.
+    # Fast DDS announces a client's writer at the moment when it sends the first request.
     got: list[int] = []
 
     def answer(_: Any) -> dict[str, Any]:
@@ -245,7 +245,7 @@ def test_two_of_our_clients_in_one_process_get_their_own_replies(node, dds_conne
     assert [call.result(30).sum for call, _ in calls] == [wanted for _, wanted in calls]
 
 
-def test_what_is_taken_while_it_is_received_does_not_stay(start_services, node, types, monkeypatch):
+def test_samples_taken_during_reception_do_not_stay(start_services, node, types, monkeypatch):
     """The library keeps its samples until they are taken again, and keeps only some."""
     before = set(cyclone_identity._readers)
     taken: list[bool] = []
@@ -310,7 +310,7 @@ def cut_off(server: Any, until: Any) -> None:
 
 
 def test_a_server_that_was_cut_off_in_a_call_and_is_back(start_services, node, types, impatient):
-    """Its answer may have been lost meanwhile: nobody waits for it for ever."""
+    """Its answer may have been lost in the meantime: the call must not wait for it for ever."""
     server = start_services("cyclone", "away", ["add"], config=SHORT_LEASE)
     client = ready(node.create_service_client("/away/add", types[ADD]))
     call = client.call_async({"a": -1}, timeout=None)
@@ -354,7 +354,7 @@ def test_a_call_goes_on_as_long_as_one_of_its_servers_stays(start_services, node
 
 
 @pytest.mark.parametrize("kind", ["cyclone", "rosglass"])
-def test_a_server_killed_in_a_call_is_told_and_its_successor_called(
+def test_server_killed_in_a_call_is_reported_and_its_successor_called(
     start_services, node, types, impatient, kind
 ):
     # How long it takes to be noticed is up to the server's participant: its lease.
@@ -388,7 +388,7 @@ def test_a_call_ends_when_another_server_has_replaced_its_killed_one(
     successor.end()
 
 
-def test_rubbish_is_named_once_and_disturbs_nobody(node, types, caplog, start, dds_domain):
+def test_rubbish_is_logged_once_and_does_not_affect_others(node, types, caplog, start, dds_domain):
     plan = {"domain": dds_domain, "requests": "/strict", "replies": "/odd"}
     server = node.create_service_server("/strict", types[ADD], lambda r: {"sum": r.a + r.b})
     client = node.create_service_client("/odd", types[ADD])
@@ -409,7 +409,7 @@ def test_rubbish_is_named_once_and_disturbs_nobody(node, types, caplog, start, d
     rubbish.end()
 
 
-def test_replies_to_what_nobody_asked_are_taken_by_nobody(node, types, start, dds_domain):
+def test_unrequested_replies_are_ignored(node, types, start, dds_domain):
     plan = {"domain": dds_domain, "service": "/foreign", "foreign": 50}
     peer = start(str(PEERS / "dds_foreign_replies_peer.py"), json.dumps(plan))
     client = ready(node.create_service_client("/foreign", types[ADD]))
@@ -420,7 +420,7 @@ def test_replies_to_what_nobody_asked_are_taken_by_nobody(node, types, start, dd
 
 
 def test_a_reply_from_the_main_thread_goes_out(node, types, peer):
-    """Where a signal's exception must not end up in Cyclone DDS."""
+    """A signal's exception in the main thread must not end up in Cyclone DDS."""
     waiting: list[Any] = []
 
     def serve(request: Any) -> Any:

@@ -129,7 +129,7 @@ def test_the_last_message_of_a_latched_peer_comes_late_but_comes(dds_connect, cy
     node = dds_connect("late")
     early = node.create_subscription("/latched", STRING)
     eventually(early.publisher_count, what="the peer's publisher")
-    # Only as long as nobody else in this process asks for what is latched: until it has heard how
+    # Only as long as no other reader in this process asks for latched data: until it has heard how
     # far the peer is, Cyclone DDS gives one reader what is sent again for another.
     assert early.wait(0.5) is None
     latched = node.create_subscription("/latched", STRING, qos=QoS.latched(10))
@@ -224,7 +224,7 @@ def test_another_type_on_the_topic_is_named_and_not_received(dds_connect, cyclon
     assert texts == {"Grüße, robot"}
 
 
-def test_rubbish_is_refused_and_disturbs_nobody(dds_connect, cyclone, caplog):
+def test_rubbish_is_refused_and_does_not_affect_others(dds_connect, cyclone, caplog):
     # Where a text should begin with its length, there is one beyond the end.
     cyclone(publish={"/noisy": STRING}, rubbish=[0, 1, 50, 5000], period=0.02)
     cyclone(publish={"/noisy": STRING}, period=0.02)
@@ -235,8 +235,8 @@ def test_rubbish_is_refused_and_disturbs_nobody(dds_connect, cyclone, caplog):
     eventually(lambda: texts.count("Grüße, robot") >= 20)
     assert set(texts) == {"Grüße, robot"}
     assert sum(not understood(sample) for sample in iter(raw.take, None)) > 10
-    told = [record for record in caplog.records if "/noisy" in record.getMessage()]
-    assert 1 <= len(told) <= 2
+    warnings = [record for record in caplog.records if "/noisy" in record.getMessage()]
+    assert 1 <= len(warnings) <= 2
 
 
 def test_a_peer_that_is_killed_leaves_and_another_takes_over(dds_connect, cyclone):

@@ -32,7 +32,7 @@ PAGES = [
 ]
 #: Those in which nothing is connected.
 ALONE = {"docs/interfaces.md", "docs/messages.md"}
-#: What a robot's own packages define.
+#: Types that a robot's own packages define.
 PACKAGES = {
     "my_robot_msgs/msg/State": "uint8 CHARGING=1\nfloat32 battery 0.5\n",
     "my_robot_msgs/srv/Ask": "string question\n---\nstring answer\n",
@@ -185,10 +185,10 @@ def robot(request: pytest.FixtureRequest, robot_library: Library) -> Iterator[Ro
 
 
 class World:
-    """What the examples of all pages take for granted: a node, and a place for files.
+    """The things that the examples of all pages take for granted: a node, and a folder for files.
 
     Args:
-        robot: Whom every URL leads to.
+        robot: The node that every URL leads to.
     """
 
     def __init__(self, robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -32,7 +32,7 @@ def node(profile, request):
 
 @pytest.fixture
 def run_dora(profile, start, router, dds_domain, service_interfaces):
-    """Start dora, which does what it is told in our node's domain."""
+    """Start dora, which follows a plan in our node's domain."""
 
     def run_dora(**plan):
         plan |= {

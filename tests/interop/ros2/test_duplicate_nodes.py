@@ -1,4 +1,4 @@
-"""Two robots of one name: said by whoever looks, as nothing else tells them apart."""
+"""Two robots of one name are reported by every observer, as only the name identifies them."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_a_second_robot_leaves_and_says_why(url: str) -> None:
         first.communicate()
 
 
-def test_of_two_robots_that_start_together_one_stays(url: str) -> None:
+def test_one_of_two_robots_that_start_together_stays(url: str) -> None:
     robots = [
         subprocess.Popen(
             [*COMMAND, "robot", "--url", url, "--fps", "5", "--leash"],

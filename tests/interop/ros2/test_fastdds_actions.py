@@ -175,10 +175,10 @@ def test_fast_dds_sends_us_goals(fast, node):
     (result,) = fast.call("get", [cdr("16s", three)])
     assert result[4] == CANCELED
     # The last may come after the result, as it is on another topic.
-    told_of_one = [[0, 1], [0, 1, 2], [0, 1, 2, 3], [0, 1, 2, 3, 4]]
-    eventually(lambda: [numbers(d, 16) for d in feedback if d[4:20] == one] == told_of_one)
+    expected = [[0, 1], [0, 1, 2], [0, 1, 2, 3], [0, 1, 2, 3, 4]]
+    eventually(lambda: [numbers(d, 16) for d in feedback if d[4:20] == one] == expected)
 
-    def told() -> set[tuple[bytes, int]]:
+    def status_entries() -> set[tuple[bytes, int]]:
         last, at, found = statuses[-1], 8, set()
         for _ in range(*struct.unpack_from("<I", last, 4)):
             stamp = at + 16 + -at % 4
@@ -186,4 +186,4 @@ def test_fast_dds_sends_us_goals(fast, node):
             at = stamp + 9
         return found
 
-    eventually(lambda: told() == {(one, SUCCEEDED), (three, CANCELED)})
+    eventually(lambda: status_entries() == {(one, SUCCEEDED), (three, CANCELED)})

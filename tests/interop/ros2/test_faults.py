@@ -35,7 +35,7 @@ pytestmark = pytest.mark.peers
 
 @pytest.fixture(params=["zenoh", "dds"])
 def url(request, router, dds_domain):
-    """Where the test's nodes meet."""
+    """URL of the nodes of a test."""
     if request.param == "dds":
         pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
         return f"dds://?domain={dds_domain}"
@@ -49,7 +49,7 @@ def node(url):
 
 
 def program(text: str, url: str, **env: str) -> subprocess.Popen[str]:
-    """Start a program that tells when it has begun, and is `node` at `url` then."""
+    """Start a program that prints when it has begun, and is `node` at `url` then."""
     head = f"print('begun', flush=True)\nimport time, rosglass\nnode = rosglass.connect({url!r})\n"
     process = subprocess.Popen(
         [sys.executable, "-c", head + text],
@@ -65,13 +65,15 @@ def program(text: str, url: str, **env: str) -> subprocess.Popen[str]:
 
 def test_a_cable_that_is_unplugged_for_ten_seconds_over_dds(on_two_machines):
     seen = on_two_machines(PEERS / "two_machines_dds.py", "10", env={"CYCLONEDDS_URI": SHORT_LEASE})
-    assert seen["lost"] < 8, "the operator is told when the lease has ended"
+    assert seen["lost"] < 8, "the operator sees it when the lease has ended"
     assert seen["states"] == ["LOST", "CONNECTED"]
-    meanwhile = seen["meanwhile"]
-    assert meanwhile["status"].startswith("LOST: all other participants have left DDS domain")
-    assert (meanwhile["publishers"], meanwhile["ready"]) == (0, False)
-    assert "no server offers /add" in meanwhile["server"]
-    assert seen["call"].startswith("ConnectionLostError"), "nobody waits for what cannot come"
+    outage = seen["outage"]
+    assert outage["status"].startswith("LOST: all other participants have left DDS domain")
+    assert (outage["publishers"], outage["ready"]) == (0, False)
+    assert "no server offers /add" in outage["server"]
+    assert seen["call"].startswith("ConnectionLostError"), (
+        "no call waits for an answer that cannot come"
+    )
     assert seen["recovered"] < 20, (
         "a second until both announce themselves again, where nothing else runs"
     )
@@ -138,7 +140,7 @@ while True:
     before, received = memory(), slow.statistics().received
     eventually(lambda: slow.statistics().received > received + 150, timeout=30)
     statistics = slow.statistics()
-    # 140 MB have come meanwhile, twice.
+    # 140 MB have been received since, twice.
     assert memory() - before < 40e6
     assert len(seen) < 100
     assert 0 <= statistics.received - statistics.dropped - len(seen) <= 10
@@ -183,7 +185,7 @@ def test_a_thousand_of_everything_leave_nothing_behind_over_dds(dds_connect):
     assert memory() - before < 6e6
 
 
-def test_what_was_sent_last_arrives_although_the_publisher_is_closed_at_once(url, node):
+def test_last_messages_arrive_although_the_publisher_is_closed_at_once(url, node):
     subscription = node.create_subscription("/big", IMAGE, qos=KEEP_ALL)
     text = f"""
 from rosglass.comm import History, QoS
@@ -218,10 +220,10 @@ time.sleep(60)
     peer.kill()
     peer.communicate()
     for publisher in publishers:
-        publisher.publish(data="nobody takes this")
+        publisher.publish(data="never received")
     began = time.monotonic()
     publishers[0].close()
-    assert time.monotonic() - began < 0.9, "a thread that closes one waits for nobody"
+    assert time.monotonic() - began < 0.9, "closing one does not wait for dead peers"
     node.close()
     assert time.monotonic() - began < 4.5, "all of them wait together"
 
@@ -257,7 +259,7 @@ def test_ctrl_c_at_any_moment_from_the_first_import_on(url):
         what = f"{moment:.3f} s after its begin: {errors}"
         # Less than 1 s where nothing else runs.
         assert time.monotonic() - sent < 20, what
-        # Python forgets why it ends when another thread runs exec() meanwhile, as for dataclasses;
+        # Python forgets why it ends if another thread runs exec() at that time, as for dataclasses;
         # and up to 3.11 it wraps what interrupts the making of a class.
         assert process.returncode in (-signal.SIGINT, 130, 1), what
         assert errors.startswith("Traceback"), what

@@ -68,12 +68,12 @@ def count():
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
-def test_nobody_listens_then_somebody_does(mode, start_router, connect):
+def test_node_connects_once_a_router_starts(mode, start_router, connect):
     before = time.monotonic()
     node = connect("early", f"?mode={mode}", url=start_router.url)
-    assert time.monotonic() - before < 3, "connecting waits for nobody"
-    told = []
-    node.on_status_change(told.append)
+    assert time.monotonic() - before < 3, "connecting does not wait for a router"
+    statuses = []
+    node.on_status_change(statuses.append)
     address = start_router.url.removeprefix("zenoh://")
     status = node.status()
     assert status.state is CONNECTING
@@ -86,9 +86,9 @@ def test_nobody_listens_then_somebody_does(mode, start_router, connect):
     appeared = time.monotonic()
     eventually(lambda: node.status().state is CONNECTED, timeout=RECOVERY)
     assert time.monotonic() - appeared < RECOVERY
-    eventually(lambda: told)
-    assert [status.state for status in told] == [CONNECTED]
-    assert told[0].detail == f"router at tcp/{address}"
+    eventually(lambda: statuses)
+    assert [status.state for status in statuses] == [CONNECTED]
+    assert statuses[0].detail == f"router at tcp/{address}"
     other = connect("other", url=start_router.url)
     eventually(lambda: NodeName("/", "early") in other.nodes())
     eventually(lambda: other.subscriptions("/count"))
@@ -97,7 +97,7 @@ def test_nobody_listens_then_somebody_does(mode, start_router, connect):
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
-def test_a_program_that_answers_nothing_blocks_nobody(mode, free_port):
+def test_unresponsive_router_does_not_block(mode, free_port):
     with socket.create_server(("127.0.0.1", free_port)):
         before = time.monotonic()
         node = rosglass.connect(f"zenoh://127.0.0.1:{free_port}?mode={mode}", "patient")
@@ -121,8 +121,8 @@ def test_a_router_that_dies_and_returns(mode, start_router, connect, count):
     router = start_router()
     talker = connect("talker", f"?mode={mode}", url=start_router.url)
     listener = connect("listener", f"?mode={mode}", url=start_router.url)
-    told = []
-    listener.on_status_change(told.append, IMMEDIATE)
+    statuses = []
+    listener.on_status_change(statuses.append, IMMEDIATE)
     receiver = Receiver(listener)
     count(talker)
     eventually(lambda: len(receiver.numbers) > 20)
@@ -149,7 +149,7 @@ def test_a_router_that_dies_and_returns(mode, start_router, connect, count):
     eventually(lambda: len(receiver.numbers) > heard + 20)
     receiver.assert_each_once()
     if mode == "client":
-        assert [status.state for status in told][-2:] == [LOST, CONNECTED]
+        assert [status.state for status in statuses][-2:] == [LOST, CONNECTED]
 
 
 def test_latched_messages_come_once_through_a_router_that_dies(start_router, connect):
@@ -320,7 +320,7 @@ def test_reachable_or_not(router, free_port):
     assert time.monotonic() - before < 10
 
 
-def test_a_program_that_is_no_router_is_not_reachable(free_port):
+def test_port_of_another_program_is_not_reachable(free_port):
     with socket.create_server(("127.0.0.1", free_port)):
         before = time.monotonic()
         assert not is_router_reachable(f"zenoh://127.0.0.1:{free_port}", timeout=0.3)
@@ -337,7 +337,7 @@ def test_a_second_router_says_that_one_is_there(router):
 @pytest.mark.parametrize(
     "listen", ["127.0.0.1:7447", "udp/127.0.0.1:1", "tcp/127.0.0.1:99999", "tcp/:7447", "", "tcp/h"]
 )
-def test_a_router_refuses_what_is_no_address(listen):
+def test_router_refuses_invalid_addresses(listen):
     with pytest.raises(rosglass.ConversionError, match="listen: expected an address such as tcp/"):
         Router(listen)
 

@@ -164,7 +164,7 @@ def test_a_goal_survives_a_router_that_is_restarted(free_port, run_peer, mode):
 
 
 @pytest.mark.parametrize(
-    ("server", "client", "told"),
+    ("server", "client", "lines"),
     [
         (
             "service_server.py",
@@ -185,16 +185,18 @@ def test_a_goal_survives_a_router_that_is_restarted(free_port, run_peer, mode):
     ],
     ids=["services", "actions"],
 )
-def test_the_examples(new_url, start, server, client, told):
+def test_the_examples(new_url, start, server, client, lines):
     url = new_url()
     serving = start(str(EXAMPLES / server), url)
     eventually(lambda: "ready; Ctrl-C ends it\n" in serving.output, what=serving.output)
     using = start(str(EXAMPLES / client), url)
     assert using.popen.wait(30) == 0, using.output
     # The lines of two threads may be mixed up, but nothing is missing.
-    eventually(lambda: told[-1] in "".join(using.output), what=using.output)
+    eventually(lambda: lines[-1] in "".join(using.output), what=using.output)
     shown = "".join(using.output)
-    assert {text: shown.count(text) for text in told} == {text: told.count(text) for text in told}
+    assert {text: shown.count(text) for text in lines} == {
+        text: lines.count(text) for text in lines
+    }
     os.kill(serving.pid, signal.SIGINT)
     assert serving.popen.wait(30) == 0
     eventually(lambda: serving.output[-1] == "bye\n", what=serving.output)

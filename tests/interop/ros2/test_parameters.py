@@ -148,7 +148,7 @@ def test_doras_parameters(start: Any, dds_connect: Any, dds_domain: int, interfa
     assert "type-stable" in results["count"].reason
     dora.ask(get="speed")
     assert dora.event("value") == 2.5
-    # dora does not implement it, and says so in a list, which is no answer of that service.
+    # dora does not implement it, and says so in a list, which is not a response of that service.
     with pytest.raises(ServiceError, match="SetParametersAtomically_Response"):
         client.set_atomically({"speed": 3.5})
     dora.ask(set=["speed", 9.5])

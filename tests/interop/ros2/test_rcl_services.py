@@ -36,7 +36,7 @@ def test_the_log_time_and_names_of_another_program(node: Any, start: Any) -> Non
     log = next(log for log in logs if log.msg == "battery low")
     assert (log.name, log.level, Path(log.file).name) == ("arms.left", 30, "rcl_services_peer.py")
 
-    # Whoever comes later gets the log of the last 10 s.
+    # A late subscription gets the log of the last 10 s.
     late: list[Any] = []
     node.create_subscription("/rosout", "rcl_interfaces/msg/Log", late.append, QoS.latched(100))
     eventually(lambda: [log for log in late if log.msg == "battery low"])

@@ -29,7 +29,7 @@ STRING, TWIST, IMAGE = "std_msgs/msg/String", "geometry_msgs/msg/Twist", "sensor
 SWITCH = "std_srvs/srv/SetBool"
 #: Types that only the peer knows.
 BASIC, ECHO = "test_msgs/msg/BasicTypes", "test_msgs/srv/BasicTypes"
-#: Of goals (action_msgs/msg/GoalStatus).
+#: Status of goals (action_msgs/msg/GoalStatus).
 SUCCEEDED, CANCELED = 4, 5
 FIBONACCI = "test_msgs/action/Fibonacci"
 
@@ -105,7 +105,7 @@ def test_rclpy_receives_what_we_publish(peer, node):
     assert [value["angular"]["z"] for value in got] == [-n for n in range(20)]
 
 
-def test_what_rclpy_latched_comes_late_but_comes(peer, node):
+def test_latched_message_of_rclpy_is_received_late(peer, node):
     do(peer, "advertise", topic="/map_name", type=STRING, latched=True, depth=1)
     do(peer, "publish", topic="/map_name", values=[{"data": "a"}, {"data": "b"}], matched=0)
     got: list[Any] = []
@@ -114,7 +114,7 @@ def test_what_rclpy_latched_comes_late_but_comes(peer, node):
     assert [message.data for message in got] == ["b"]
 
 
-def test_what_we_latched_reaches_rclpy_late(peer, node):
+def test_our_latched_message_reaches_rclpy_late(peer, node):
     with node.create_publisher("/our_map", STRING, QoS.latched()) as publisher:
         for text in "ab":
             publisher.publish(data=text)
@@ -390,11 +390,11 @@ def test_we_set_parameters_of_rclpy(peer, node):
 
 def test_rclpy_sets_our_parameters(peer, node):
     node.parameters.declare("gain", 1.5)
-    told = do(peer, "parameters", of="/own/cockpit", set={"gain": 2.5, "nix": 1})
+    found = do(peer, "parameters", of="/own/cockpit", set={"gain": 2.5, "nix": 1})
     assert node.parameters.get("gain") == 2.5
-    assert told["values"][0] == 2.5
-    assert told["successful"] == [True, False]
-    assert "gain" in told["names"]
+    assert found["values"][0] == 2.5
+    assert found["successful"] == [True, False]
+    assert "gain" in found["names"]
 
 
 # -- graph -----------------------------------------------------------------------------------------
@@ -484,8 +484,8 @@ def test_lists_wait_until_rclpy_has_introduced_itself(peer, rosglass_command, at
 def test_types_that_only_rclpy_knows_are_waited_for(peer, rosglass_command, attempt):
     do(peer, "advertise", topic=f"/unknown{attempt}", type=BASIC, latched=True)
     do(peer, "publish", topic=f"/unknown{attempt}", values=[{"int32_value": 7}], matched=0)
-    code, told, error = rosglass_command("interface", "show", BASIC)
-    assert (code, "float64 float64_value" in told) == (0, True), error
+    code, output, error = rosglass_command("interface", "show", BASIC)
+    assert (code, "float64 float64_value" in output) == (0, True), error
     echo = ("topic", "echo", "--once", "--qos", "latched", f"/unknown{attempt}")
-    code, told, error = rosglass_command(*echo)
-    assert (code, "int32_value: 7" in told) == (0, True), told + error
+    code, output, error = rosglass_command(*echo)
+    assert (code, "int32_value: 7" in output) == (0, True), output + error

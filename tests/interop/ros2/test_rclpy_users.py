@@ -1,4 +1,4 @@
-"""What people who know rclpy write, in Python and on the command line, against rclpy itself."""
+"""Calls and commands of users who know rclpy, against rclpy itself."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_every_member_of_rclpy_is_here_or_named(robot: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "value", "told"),
+    ("name", "text", "value", "message"),
     [
         ("gain", "5", 5.0, "gain is declared otherwise: it is set to 5.0"),
         ("gain", "2.5", 2.5, ""),
@@ -56,7 +56,7 @@ def test_every_member_of_rclpy_is_here_or_named(robot: Any) -> None:
     ],
 )
 def test_values_are_set_as_the_parameter_is_declared(
-    robot: Any, run_command: Any, dds_domain: int, name: str, text: str, value: Any, told: str
+    robot: Any, run_command: Any, dds_domain: int, name: str, text: str, value: Any, message: str
 ) -> None:
     url = f"dds://?domain={dds_domain}"
     code, _, err = run_command("param", "set", "/robot", name, text, "--url", url)
@@ -64,12 +64,12 @@ def test_values_are_set_as_the_parameter_is_declared(
     heard = json.loads(robot[0].stdout.readline())
     assert heard == [name, value]
     assert type(heard[1]) is type(value)
-    assert told in err
-    assert ("declared otherwise" in err) == bool(told)
+    assert message in err
+    assert ("declared otherwise" in err) == bool(message)
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "told"),
+    ("name", "text", "message"),
     [
         ("gain", "9007199254740993", "is not a double: the nearest one is 9007199254740992.0"),
         ("gain", "fast", "refuses to set gain"),
@@ -77,9 +77,9 @@ def test_values_are_set_as_the_parameter_is_declared(
     ],
 )
 def test_values_that_do_not_fit_are_refused(
-    robot: Any, run_command: Any, dds_domain: int, name: str, text: str, told: str
+    robot: Any, run_command: Any, dds_domain: int, name: str, text: str, message: str
 ) -> None:
     url = f"dds://?domain={dds_domain}"
     code, _, err = run_command("param", "set", "/robot", name, text, "--url", url)
     assert code == 1
-    assert told in err
+    assert message in err

@@ -25,7 +25,7 @@ LOST = 1.0
 #: Seconds between two lines of the peer's; where it takes longer, the machine was busy.
 PERIOD = 0.05
 KILLS = 3
-#: Where a message's number is: after the header and an empty layout.
+#: The bytes of a message's number: after the header and an empty layout.
 NUMBER = slice(16, 24)
 
 
@@ -74,7 +74,7 @@ def test_a_killed_recording_is_readable_but_for_its_last_second(start, router, t
     assert len(read) == KILLS
 
 
-def test_what_comes_now_and_then_is_in_the_file_within_a_second(connect, tmp_path):
+def test_rare_messages_are_in_the_file_within_a_second(connect, tmp_path):
     robot, panel = connect("robot"), connect("panel")
     publisher = robot.create_publisher("/numbers", "std_msgs/msg/ByteMultiArray", QoS.latched())
     path = tmp_path / "rare.mcap"

@@ -46,8 +46,8 @@ def test_two_robots(node: Any, start: Any) -> None:
     eventually(lambda: tree()["camera"].authority == "/left", lambda: tree()["camera"])
     eventually(lambda: tree()["gripper"].authority == "/right", lambda: tree()["gripper"])
 
-    told: list[None] = []
-    buffer.on_change("map", "camera", lambda: told.append(None))
+    notified: list[None] = []
+    buffer.on_change("map", "camera", lambda: notified.append(None))
     eventually(lambda: listener.subscriptions[0].publisher_count() == 2)
     later = Time(START + 50_000_000)
     promise = buffer.lookup_transform_async("map", "camera", later, timeout=30)
@@ -57,14 +57,14 @@ def test_two_robots(node: Any, start: Any) -> None:
     found = promise.result(30)
     assert found.translation == (1.0, 2.0, 0.0)
     assert found.stamp == later
-    assert told
+    assert notified
     with pytest.raises(ExtrapolationException):
         buffer.lookup_transform("map", "camera", Time(START - 1))
 
     listener.close()
 
 
-def test_who_receives_cannot_wait(node: Any, start: Any) -> None:
+def test_receiving_thread_cannot_wait(node: Any, start: Any) -> None:
     plan = {"url": node.url, "name": "waker", "static": ["waker"]}
     robot = start(str(PEERS / "tf_peer.py"), json.dumps(plan))
     robot.event("ready")
@@ -119,6 +119,6 @@ def test_the_guide_as_it_is_printed(
         eventually(lambda: "odom" in names["buffer"].tree())
     finally:
         names["node"].close()
-    told = capsys.readouterr().out
-    assert "(3.0, 0.0, 0.0)" in told
-    assert "'camera'" in told
+    output = capsys.readouterr().out
+    assert "(3.0, 0.0, 0.0)" in output
+    assert "'camera'" in output

@@ -32,7 +32,7 @@ def peer(kind, router, start_peer):
     plan = {
         "publish": {topic("from", name): name for name in TYPES},
         "subscribe": {topic("to", name): name for name in TYPES},
-        # dora's domains differ unless told twice; another domain than 0 shows that all agree.
+        # dora's domains differ unless given twice; another domain than 0 shows that all agree.
         "domain": 7,
     }
     process = start_peer(kind, router, **plan)
@@ -125,7 +125,7 @@ def test_the_last_message_of_a_latched_peer_comes_late_but_comes(
     process = start_peer(peer_kind, router, **plan)
     node = connect("late", "?domain=8")
     eventually(lambda: node.publishers("/latched"))
-    # So late that the message was sent long before: whoever wants none of the past gets nothing.
+    # So late that the message was sent long before: a volatile subscription gets nothing.
     process.event("published")
     assert node.create_subscription("/latched", name).wait(1) is None
     subscription = node.create_subscription("/latched", name, qos=rosglass.QoS.latched())

@@ -52,7 +52,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.fixture(params=["zenoh", "dds"])
 def url(request: pytest.FixtureRequest) -> str:
-    """Where the robot is: behind a router, or in a DDS domain."""
+    """URL of the robot: behind a router, or in a DDS domain."""
     if request.param == "zenoh":
         return str(request.getfixturevalue("router").url)
     pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
@@ -110,7 +110,7 @@ def test_topics(robot, cockpit) -> None:
     assert process.event("command") == {"state": 3, "parts": [{"a": 5}], "name": ""}
 
 
-def test_what_comes_before_the_definition_is_recorded(url, folders, cockpit, tmp_path) -> None:
+def test_messages_before_the_definition_are_recorded(url, folders, cockpit, tmp_path) -> None:
     library = Library()
     library.add_path(folders["truth"])
     node = cockpit()
@@ -179,11 +179,11 @@ def test_a_robot_that_sends_no_definitions(robot, cockpit) -> None:
     node = cockpit()
     samples: list[Any] = []
     subscription = node.create_subscription("/state", raw_callback=samples.append)
-    told = "/robot has no get_type_description service"
-    eventually(lambda: told in subscription.problem, what=lambda: subscription.problem)
+    problem = "/robot has no get_type_description service"
+    eventually(lambda: problem in subscription.problem, what=lambda: subscription.problem)
     # Raw bytes come all the same.
     assert isinstance(eventually(lambda: samples)[0].type, OpaqueType)
-    with pytest.raises(TypeNotFoundError, match=told):
+    with pytest.raises(TypeNotFoundError, match=problem):
         node.fetch_type(STATE)
 
 
@@ -192,10 +192,10 @@ def test_a_liar_is_named_once(robot, cockpit, caplog) -> None:
     node = cockpit()
     samples: list[Any] = []
     subscription = node.create_subscription("/state", raw_callback=samples.append)
-    told = f"/robot: it sent a definition of {STATE} with the hash RIHS01_"
-    eventually(lambda: told in subscription.problem, what=lambda: subscription.problem)
+    problem = f"/robot: it sent a definition of {STATE} with the hash RIHS01_"
+    eventually(lambda: problem in subscription.problem, what=lambda: subscription.problem)
     assert isinstance(eventually(lambda: samples)[0].type, OpaqueType)
-    with pytest.raises(TypeNotFoundError, match=told):
+    with pytest.raises(TypeNotFoundError, match=problem):
         node.fetch_type(STATE)
     assert caplog.text.count("a definition from /robot is not used") == 1
     assert process.event("asked") == STATE
@@ -277,8 +277,8 @@ def test_types_that_endpoints_announce_themselves(cyclone, dds_connect) -> None:
     subscription = node.create_subscription("/state")
     sample = eventually(subscription.take, timeout=15, what=lambda: subscription.problem)
     part = {"a": 1, "xyz": [1.0, 2.0, 3.0]}
-    told = json.dumps(sample.message().to_dict(), default=lambda array: array.tolist())
-    assert json.loads(told) == {
+    text = json.dumps(sample.message().to_dict(), default=lambda array: array.tolist())
+    assert json.loads(text) == {
         "state": 3,
         "flag": True,
         "parts": [part, part],

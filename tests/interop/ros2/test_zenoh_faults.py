@@ -33,9 +33,11 @@ RECOVERY = 20.0
 
 def test_a_cable_that_is_unplugged_for_ten_seconds(on_two_machines):
     seen = on_two_machines(HERE / "peers" / "two_machines_zenoh.py", "10")
-    assert seen["lost"] < 8, "the operator is told soon"
+    assert seen["lost"] < 8, "the operator sees it soon"
     assert seen["states"] == ["LOST", "LOST", "CONNECTED"], "silent, then given up, then back"
-    assert seen["call"].startswith("ConnectionLostError"), "nobody waits for what cannot come"
+    assert seen["call"].startswith("ConnectionLostError"), (
+        "no call waits for an answer that cannot come"
+    )
     assert seen["recovered"] < RECOVERY
     assert seen["silence"] > 9
     assert seen["ordered"], "nothing comes twice, nothing old comes late"
@@ -139,7 +141,9 @@ while True:
 """
 
 
-def test_what_a_stalled_link_hands_on_too_late_is_dropped_if_it_says_so(start_router, connect):
+def test_messages_with_a_lifespan_are_dropped_if_a_stalled_link_delivers_them_late(
+    start_router, connect
+):
     router = start_router()
     robot, cockpit = (
         connect(name, "?mode=client", url=start_router.url) for name in ("robot", "cockpit")
@@ -250,7 +254,7 @@ def test_a_slow_consumer_costs_no_memory(router, start, connect):
     before, received = memory(), subscription.statistics().received
     eventually(lambda: subscription.statistics().received > received + 150)
     statistics = subscription.statistics()
-    # 140 MB have come meanwhile.
+    # 140 MB have been received since.
     assert memory() - before < 40e6
     assert len(seen) < 100
     assert 0 <= statistics.received - statistics.dropped - len(seen) <= 10
@@ -302,10 +306,10 @@ def test_rubbish_is_named_and_disturbs_nothing(router, connect, caplog):
     client = good.create_service_client("/add", ADD)
     assert client.call({"a": 1, "b": 2}).sum == 3
     assert server.problem == ""
-    told = [record.getMessage() for record in caplog.records]
+    messages = [record.getMessage() for record in caplog.records]
     for what in ("invalid graph token", "/count", "/add"):
-        assert any(what in line for line in told), what
-    assert len(told) < 20, told
+        assert any(what in line for line in messages), what
+    assert len(messages) < 20, messages
 
 
 def test_a_server_that_answers_rubbish(router, connect, caplog):
@@ -389,7 +393,7 @@ def test_a_thousand_of_everything_leave_nothing_behind(start_router, connect):
     assert open_files() <= files + 2
     assert len(gc.get_objects()) < objects + 500
     assert memory() - before < 10e6
-    assert subscription.statistics().lost == 0, "endpoints that follow each other are told apart"
+    assert subscription.statistics().lost == 0, "successive endpoints are distinguished"
     assert node.status().state is ConnectionState.CONNECTED
 
 
@@ -477,7 +481,7 @@ def test_ctrl_c_at_any_moment(delay, router):
 
 @pytest.fixture
 def other_session(router):
-    """A Zenoh session that is no node, as Zenoh's own confusion cannot be had when it is wanted."""
+    """A Zenoh session without a node, for confusion that Zenoh itself causes only by chance."""
     zenoh = pytest.importorskip("zenoh")
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
@@ -512,7 +516,7 @@ def test_messages_on_the_wrong_topic_are_dropped_and_counted(connect, other_sess
     eventually(lambda: not cockpit.publishers("/flashlight/state"))
     number = put("wrong", other.gid)
     eventually(lambda: dropped(number), what="of a publisher that has left")
-    # Publishers of dora-rs and others have identities that no token tells.
+    # Publishers of dora-rs and others have identities that no token announces.
     eventually(lambda: put("right", bytes(range(16))) and got)
     assert {message.data for message in got} == {"right"}
     logged = [each for each in caplog.records if "dropping a message of /fla" in each.message]

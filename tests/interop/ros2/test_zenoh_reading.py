@@ -59,7 +59,7 @@ def has_thread(word):
     return any(word in thread.name for thread in threading.enumerate())
 
 
-def test_what_nobody_waits_for_is_collected_and_comes_at_once_to_who_waits(connect, stream):
+def test_unread_samples_are_collected_and_delivered_at_once_to_a_waiting_reader(connect, stream):
     node = connect("cockpit")
     subscription = node.create_subscription("/count", TWIST, qos=rosglass.QoS(100_000))
     eventually(subscription.publisher_count)
@@ -135,7 +135,7 @@ def test_closing_ends_every_way_of_receiving(connect, stream):
     assert len(received.numbers) == count
 
 
-def test_samples_that_do_not_say_who_sent_them(router, connect, caplog):
+def test_samples_without_sender_are_received(router, connect, caplog):
     zenoh = pytest.importorskip("zenoh")
     node, received = connect("cockpit"), Received()
     node.create_subscription("/count", TWIST, received)
@@ -154,8 +154,8 @@ def test_samples_that_do_not_say_who_sent_them(router, connect, caplog):
             return len(received.numbers) > 10
 
         eventually(arrived)
-    told = [
+    warnings = [
         record.message for record in caplog.records if "attachments of 8 bytes" in record.message
     ]
-    assert len(told) == 1
-    assert "/count" in told[0]
+    assert len(warnings) == 1
+    assert "/count" in warnings[0]

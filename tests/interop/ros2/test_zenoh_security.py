@@ -105,7 +105,7 @@ def refused(connect: Callable[..., Node], url: str) -> str:
     return node.status().detail
 
 
-def test_a_router_with_users_lets_in_who_has_a_password(
+def test_router_with_users_admits_users_with_a_password(
     folder: Path, run: Callable[[str, str], Router], connect: Callable[..., Node]
 ) -> None:
     router = run("tcp", f"auth: {{ usrpwd: {{ dictionary_file: '{folder}/users.txt' }} }}")

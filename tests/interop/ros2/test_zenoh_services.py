@@ -27,7 +27,7 @@ pytestmark = pytest.mark.peers
 
 @pytest.fixture(scope="module")
 def run_peer(start, router, service_interfaces):
-    """Start a peer, which does what it is told in a domain of its own."""
+    """Start a peer, which follows a plan in a domain of its own."""
 
     def run_peer(kind, **plan):
         script, _, profile = kind.partition("-")
@@ -129,7 +129,7 @@ def test_the_peer_calls_us(node, kind, run_peer, answers):
         timer.join()
 
 
-def test_the_peer_is_told_when_our_callback_fails(node, kind, run_peer):
+def test_peer_is_notified_when_our_callback_fails(node, kind, run_peer):
     def fail(request):
         raise ValueError("the arm is off")
 

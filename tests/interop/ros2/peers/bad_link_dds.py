@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from bad_link import BadLink
-from summary import tell
+from summary import report
 from waiting import eventually, nothing_happens
 
 import rosglass
@@ -43,7 +43,7 @@ def ip_fragments() -> int:
 try:
     link = BadLink()
 except OSError as error:
-    tell(missing=str(error))
+    report(missing=str(error))
     sys.exit()
 with link, rosglass.connect("dds://", "operator") as node:
     link.start(sys.executable, "-c", ROBOT, ready="ready")
@@ -64,4 +64,4 @@ with link, rosglass.connect("dds://", "operator") as node:
     began, before = time.monotonic(), dict(got)
     # More than what may still have been on its way.
     eventually(lambda: all(got[topic] > before[topic] + 15 for topic in CAMERAS), timeout=60)
-    tell(missing="", back=time.monotonic() - began, ip_fragments=ip_fragments())
+    report(missing="", back=time.monotonic() - began, ip_fragments=ip_fragments())

@@ -1,6 +1,6 @@
 """Cyclone DDS's own Python nodes, with real types: `cyclone_peer.py PLAN`, see ``plan`` below.
 
-It speaks plain DDS and writes what rmw_cyclonedds writes; it tells what it sees of others as raw
+It speaks plain DDS and writes what rmw_cyclonedds writes; it reports what it sees of others as raw
 Cyclone DDS shows it, and ends on ``{"quit": true}``. Its types need annotations that are evaluated.
 """
 
@@ -25,12 +25,12 @@ from cyclonedds.qos import Policy
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
-from summary import tell
+from summary import report
 
 # The plan: "domain", "width" of identities in bytes, "topics" (what node /cyclone/talker has, by
 # topic: a "writer" or a "reader" of std_msgs/msg/String), "hash" of their type, "service" (name of
 # an AddTwoInts server of node /cyclone/adder), "foreign" (a DDS topic that is not of ROS),
-# "rubbish" (whether to write that about nodes), "observe" (whether to tell what others announce).
+# "rubbish" (whether to write that about nodes), "observe" (whether to report what others announce).
 plan = json.loads(sys.argv[1])
 info = "rmw_dds_common::msg::dds_"
 srv = "example_interfaces::srv::dds_::AddTwoInts"
@@ -135,7 +135,7 @@ def user_data(qos: Qos) -> str:
 
 
 def observe() -> None:
-    """Tell what others announce, as plain Cyclone DDS sees it."""
+    """Report what others announce, as plain Cyclone DDS sees it."""
     mask = SampleState.Any | ViewState.Any | InstanceState.Any
     infos = DataReader(
         participant,
@@ -157,19 +157,19 @@ def observe() -> None:
             for sample in reader.take(100):
                 if kind == "nodes" and isinstance(sample, ParticipantEntitiesInfo):
                     nodes = [node_of(entities) for entities in sample.node_entities_info_seq]
-                    tell(info={"gid": bytes(sample.gid.data).hex(), "nodes": nodes})
+                    report(info={"gid": bytes(sample.gid.data).hex(), "nodes": nodes})
                 elif kind == "participant" and sample.sample_info.valid_data:
-                    guid, told = sample.key.bytes.hex(), user_data(sample.qos)
-                    tell(participant={"guid": guid, "user_data": told})
+                    guid, data = sample.key.bytes.hex(), user_data(sample.qos)
+                    report(participant={"guid": guid, "user_data": data})
                 elif kind in ("reader", "writer") and sample.sample_info.valid_data:
-                    told = {"topic": sample.topic_name, "type": sample.type_name}
-                    told |= {"guid": sample.key.bytes.hex(), "user_data": user_data(sample.qos)}
-                    tell(**{kind: told})
+                    found = {"topic": sample.topic_name, "type": sample.type_name}
+                    found |= {"guid": sample.key.bytes.hex(), "user_data": user_data(sample.qos)}
+                    report(**{kind: found})
 
 
 if plan.get("observe"):
     threading.Thread(target=observe, daemon=True).start()
-tell(ready=True)
+report(ready=True)
 for line in sys.stdin:
     if json.loads(line).get("quit"):
         DDS._dll_handle.dds_delete(participant._ref)

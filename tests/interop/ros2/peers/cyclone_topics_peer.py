@@ -18,7 +18,7 @@ from cyclonedds.qos import Policy
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
-from summary import VALUES, summary, tell
+from summary import VALUES, report, summary
 from waiting import at_rate, eventually
 
 # What is in the plan: "domain"; types by topic to "publish" and "subscribe"; how many to publish in
@@ -129,10 +129,10 @@ def subscribe(name: str, kind: type, reader: DataReader) -> None:
     for _ in at_rate(0.002):
         if not linked and reader.get_matched_publications():
             linked = True
-            tell(linked=name)
+            report(linked=name)
         for sample in reader.take(100):
             if isinstance(sample, kind):
-                tell(received=name, value=summary(sample))
+                report(received=name, value=summary(sample))
 
 
 def publish(name: str, type_name: str, kind: type, writer: DataWriter) -> None:
@@ -146,7 +146,7 @@ def publish(name: str, type_name: str, kind: type, writer: DataWriter) -> None:
             if plan.get("texts"):
                 sample.data = f"{number}"
             writer.write(sample)
-    tell(published=name)
+    report(published=name)
     kept.append(writer)
 
 
@@ -169,7 +169,7 @@ for name, of_type in plan.get("publish", {}).items():
     )
 for thread in threads:
     thread.start()
-tell(ready=True)
+report(ready=True)
 sys.stdin.readline()
 begin.set()
 sys.stdin.read()

@@ -18,7 +18,7 @@ from cyclonedds.qos import Policy
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
-from summary import tell
+from summary import report
 from waiting import at_rate
 
 plan = json.loads(sys.argv[1])
@@ -64,4 +64,4 @@ for _ in at_rate(0.005):
             sent += 1
         for _ in range(2):
             replies.write(Response(client, number, request.a + request.b))
-        tell(sent=sent)
+        report(sent=sent)

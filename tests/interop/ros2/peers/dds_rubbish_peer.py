@@ -1,4 +1,4 @@
-"""Sends bytes that are no requests and no replies: `dds_rubbish_peer.py PLAN`.
+"""Sends bytes that are neither requests nor replies: `dds_rubbish_peer.py PLAN`.
 
 The plan: "domain", "requests" and "replies", services of type example_interfaces/srv/AddTwoInts
 whose requests and replies to spoil. It has no server's ids, as no rmw has written it.
@@ -18,7 +18,7 @@ from cyclonedds.qos import Policy
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
-from summary import tell
+from summary import report
 from waiting import at_rate, eventually
 
 plan = json.loads(sys.argv[1])
@@ -53,7 +53,7 @@ time.sleep(0.2)
 for number in range(20):
     requests.write(Request(number))
     replies.write(Response(number))
-tell(sent=True)
+report(sent=True)
 for _ in at_rate(0.01):
     for _ in odd.take(10):
         replies.write(Response(4711))

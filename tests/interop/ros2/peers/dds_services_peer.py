@@ -1,8 +1,8 @@
 """A client and server of two services over DDS, of any kind: `dds_services_peer.py PLAN`.
 
 It offers `/<name>/add` (example_interfaces/srv/AddTwoInts) and `/<name>/blob`
-(blob_interfaces/srv/Blob), and calls them where it is told to on standard input. It never answers
-additions of a = -1; on rosglass, it answers those of a = -2 when it is told to, {"finish": true}.
+(blob_interfaces/srv/Blob), and calls them on request from standard input. It never answers
+additions of a = -1; on rosglass, it answers those of a = -2 on request, {"finish": true}.
 Its types need annotations that are evaluated.
 """
 
@@ -14,7 +14,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
-from summary import tell
+from summary import report
 from waiting import at_rate, eventually
 
 # The plan: "kind" (below), "domain", "name", "serve" (which of "add" and "blob" it offers), "call"
@@ -36,7 +36,7 @@ def answer(kind: str, request: Any) -> Any:
     if kind == "blob":
         return request[::-1]
     a, b = request
-    tell(got=[a, b])
+    report(got=[a, b])
     return None if a == NEVER else a + b
 
 
@@ -122,7 +122,7 @@ class Dora:
 
     def open(self, service: str, kind: str) -> None:
         self.clients[service] = self.node.create_service_client(service, self.types[kind], self.qos)
-        # RustDDS tells those it meets of ten of its readers and writers a second.
+        # RustDDS announces ten of its readers and writers a second.
         time.sleep(max(SETTLING, self.born + 2.5 - time.monotonic()))
 
     def call(self, service: str, kind: str, requests: list[Any]) -> list[Any]:
@@ -207,7 +207,7 @@ class Cyclone:
         def work() -> None:
             for _ in at_rate(0.001):
                 taken = reader.take(100)
-                # Others only tell that a client is gone.
+                # Other samples only report that a client is gone.
                 for request in (item for item in taken if isinstance(item, request_type)):
                     given = bytes(request.data) if kind == "blob" else (request.a, request.b)
                     value = answer(kind, given)
@@ -298,13 +298,13 @@ def work(order: dict[str, Any]) -> None:
             peer.open(service, kind)
         answers = peer.call(service, kind, requests)
     except Exception as error:
-        tell(answers=f"{type(error).__name__}: {error}")
+        report(answers=f"{type(error).__name__}: {error}")
         return
-    tell(answers=answers if kind == "add" else [answers[0] == requests[0][::-1]])
+    report(answers=answers if kind == "add" else [answers[0] == requests[0][::-1]])
 
 
 opened: set[str] = set()
 pool = ThreadPoolExecutor(1)
-tell(ready=True)
+report(ready=True)
 for line in sys.stdin:
     pool.submit(work, json.loads(line))

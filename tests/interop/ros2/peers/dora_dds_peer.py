@@ -6,7 +6,7 @@ import json
 import sys
 
 import dora
-from summary import tell
+from summary import report
 
 # {"domain", "interfaces", "publish": {topic: type}, "subscribe": {topic: type}}
 plan = json.loads(sys.argv[1])
@@ -22,5 +22,5 @@ def topic(name: str, type_name: str):
 
 kept = [node.create_publisher(topic(*item)) for item in plan.get("publish", {}).items()]
 kept += [node.create_subscription(topic(*item)) for item in plan.get("subscribe", {}).items()]
-tell(ready=True)
+report(ready=True)
 sys.stdin.read()  # until the tests end

@@ -10,7 +10,7 @@ import sys
 import threading
 
 import dora
-from summary import tell
+from summary import report
 
 # {"domain", "interfaces", "parameters": {name: value}}
 plan = json.loads(sys.argv[1])
@@ -18,7 +18,7 @@ transport = dora.Ros2Transport.dds()
 context = dora.Ros2Context([plan["interfaces"]], transport=transport, domain_id=plan["domain"])
 options = dora.Ros2NodeOptions()
 node = context.new_node("dora_node", "/dora", options, parameters=plan["parameters"])
-tell(ready=True)
+report(ready=True)
 
 
 def ask() -> None:
@@ -27,7 +27,7 @@ def ask() -> None:
         if "set" in request:
             node.set_parameter(*request["set"])
         else:
-            tell(value=node.get_parameter(request["get"]))
+            report(value=node.get_parameter(request["get"]))
 
 
 threading.Thread(target=ask, daemon=True).start()

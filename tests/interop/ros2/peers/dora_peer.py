@@ -9,7 +9,7 @@ from pathlib import Path
 
 import dora
 import pyarrow as pa
-from summary import VALUES, summary, tell
+from summary import VALUES, report, summary
 from waiting import at_rate
 
 # {"port", "domain", "interfaces", "profile": "humble" or "rep2016" over Zenoh, "dds" without port,
@@ -67,13 +67,13 @@ publishers = [
     (node.create_publisher(topic(name, type_name)), value(type_name))
     for name, type_name in plan.get("publish", {}).items()
 ]
-tell(ready=True)
+report(ready=True)
 count = plan.get("count")
 for number in at_rate(0.1):
     for publisher, message in publishers if count is None or number < count else []:
         publisher.publish(message)
     if number == count:
-        tell(published=True)
+        report(published=True)
     for name, subscription in subscriptions.items():
         while (message := subscription.next()) is not None:
-            tell(received=name, value=summary(message.to_pylist()[0]))
+            report(received=name, value=summary(message.to_pylist()[0]))

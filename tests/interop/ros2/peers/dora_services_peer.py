@@ -15,7 +15,7 @@ from pathlib import Path
 
 import dora
 import pyarrow as pa
-from summary import tell
+from summary import report
 from waiting import eventually
 
 # {"port", "domain", "interfaces", "profile": "humble" or "rep2016" over Zenoh, or "dds", "do"}
@@ -52,7 +52,7 @@ def serve():
         node.create_service_server(f"{name}{plan.get('suffix', '')}", ADD, qos)
         for name in ("/add", "/hold", "/never")
     )
-    tell(ready=True)
+    report(ready=True)
     held = []
     while True:
         if (request := adding.take_request(timeout_s=0.02)) is not None:
@@ -60,17 +60,17 @@ def serve():
         if (request := holding.take_request(timeout_s=0.02)) is not None:
             held.append(request)
         if len(held) == 5:
-            tell(held=5)
+            report(held=5)
             for request in reversed(held):
                 add(holding, request)
             held.clear()
         if ignoring.take_request(timeout_s=0.001) is not None:
-            tell(ignored=True)
+            report(ignored=True)
 
 
 def serve_action():
     server = node.create_action_server("/count", FIBONACCI, qos)
-    tell(ready=True)
+    report(ready=True)
     while True:
         taken = server.take_goal(timeout_s=0.1)
         if taken is None:
@@ -85,7 +85,7 @@ def serve_action():
                 status = "canceled"
         numbers = pa.array([{"sequence": sequence}], _sequence())
         server.send_result(goal, numbers, status=status, timeout_s=10.0)
-        tell(status=status)
+        report(status=status)
 
 
 def _sequence():
@@ -93,10 +93,10 @@ def _sequence():
 
 
 def call():
-    tell(ready=True)
+    report(ready=True)
     client = node.create_service_client(plan.get("service", "/add"), ADD, qos)
     for first, second in plan["pairs"]:
-        tell(**ask(client, pa.array([{"a": first, "b": second}])))
+        report(**ask(client, pa.array([{"a": first, "b": second}])))
 
 
 def ask(client, request):
@@ -108,14 +108,14 @@ def ask(client, request):
 
 def send_goals():
     client = node.create_action_client("/count", FIBONACCI, qos)
-    tell(ready=True)
+    report(ready=True)
     # RustDDS announces ten of its readers and writers a second, more slowly if packets are lost:
-    # the test says when its server knows all, as what it sends before that may be lost.
+    # the test says when its server knows all, as earlier requests may be lost.
     sys.stdin.readline()
     for order, cancels in plan["goals"]:
         goal = send_goal(client, order)
         if goal is None:
-            tell(rejected=order)
+            report(rejected=order)
             continue
         feedback, cancelled = [], None
         while len(feedback) < order - 1:
@@ -127,11 +127,11 @@ def send_goals():
                 cancelled = client.cancel(goal, timeout_s=10.0)
                 break
         if cancelled is not None:
-            tell(cancelled=cancelled)  # dora forgets the goal with that
+            report(cancelled=cancelled)  # dora forgets the goal with that
             continue
         # dora asks again each time.
         status, result = eventually(lambda goal=goal: client.take_result(goal, timeout_s=5.0))
-        tell(status=status, sequence=result[0]["sequence"].as_py(), feedback=feedback)
+        report(status=status, sequence=result[0]["sequence"].as_py(), feedback=feedback)
 
 
 def send_goal(client, order):
@@ -141,7 +141,7 @@ def send_goal(client, order):
         try:
             return [client.send_goal(pa.array([{"order": order}], _order()), timeout_s=5.0)]
         except RuntimeError as error:
-            tell(unanswered=str(error).partition("\n")[0])
+            report(unanswered=str(error).partition("\n")[0])
             return []
 
     return eventually(answer)[0]

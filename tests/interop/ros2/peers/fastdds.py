@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 #: Seconds after its start when it is known to those it meets, and it knows their endpoints: some
-#: are told only with its next heartbeat, each second.
+#: are announced only with its next heartbeat, each second.
 KNOWN = 1.3
 #: Seconds until what it makes later is known.
 SETTLING = 0.2

@@ -73,7 +73,7 @@ public:
 
 static std::mutex output;
 
-static void tell(const std::string& json) {
+static void report(const std::string& json) {
   std::lock_guard<std::mutex> lock(output);
   std::cout << "{" << json << "}" << std::endl;
 }
@@ -118,8 +118,8 @@ struct Endpoint : public DataReaderListener, public DataWriterListener {
   void matched(std::set<InstanceHandle_t>& who, const InstanceHandle_t& handle, int change) {
     std::lock_guard<std::mutex> lock(mutex);
     if (change > 0) who.insert(handle); else who.erase(handle);
-    tell(quoted("matched", id) + ", \"readers\": " + std::to_string(readers.size()) +
-         ", \"writers\": " + std::to_string(writers.size()));
+    report(quoted("matched", id) + ", \"readers\": " + std::to_string(readers.size()) +
+           ", \"writers\": " + std::to_string(writers.size()));
   }
   void on_publication_matched(DataWriter*, const PublicationMatchedStatus& status) override {
     matched(readers, status.last_subscription_handle, status.current_count_change);
@@ -144,17 +144,17 @@ struct Endpoint : public DataReaderListener, public DataWriterListener {
       auto number = ++last;
       requests[number] = identity;
       lock.unlock();
-      tell(quoted("request", id) + ", \"number\": " + std::to_string(number) + data);
+      report(quoted("request", id) + ", \"number\": " + std::to_string(number) + data);
     } else if (is_client) {
       auto& related = info.related_sample_identity;
       if (related.writer_guid() != from->guid() && related.writer_guid() != writer->guid())
-        return tell(quoted("foreign", id) + ", " + quoted("to", hex(related.writer_guid())));
+        return report(quoted("foreign", id) + ", " + quoted("to", hex(related.writer_guid())));
       std::lock_guard<std::mutex> lock(mutex);
       auto call = calls.find(static_cast<int64_t>(related.sequence_number().to64long()));
       auto number = call == calls.end() ? -1 : call->second;
-      tell(quoted("reply", id) + ", \"number\": " + std::to_string(number) + data);
+      report(quoted("reply", id) + ", \"number\": " + std::to_string(number) + data);
     } else {
-      tell(quoted("received", id) + data);
+      report(quoted("received", id) + data);
     }
   }
   void call(long number, Bytes bytes) {
@@ -222,7 +222,7 @@ int main(int, char** argv) {
     end->writer = publisher->create_datawriter(on, qos, end);
   };
 
-  tell("\"ready\": true");
+  report("\"ready\": true");
   for (std::string line; std::getline(std::cin, line);) {
     std::istringstream words(line);
     std::string verb, id, name, type, options, data;
@@ -263,9 +263,9 @@ int main(int, char** argv) {
         add_writer(end, end->is_server ? replies : requests, "");
         add_reader(end, end->is_server ? requests : replies, "");
       }
-      tell(quoted("made", id));
+      report(quoted("made", id));
     }
   }
-  // No orderly farewell is needed: whoever closes the standard input is done with us.
+  // No orderly end is needed: the test closes standard input when it is done.
   std::_Exit(0);
 }

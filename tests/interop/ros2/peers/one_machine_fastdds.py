@@ -12,7 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from summary import tell
+from summary import report
 from waiting import at_rate, eventually
 
 import rosglass
@@ -60,7 +60,7 @@ try:
             check=False,
             text=True,
         )
-        tell(
+        report(
             before=before,
             problem=publisher.problem,
             dropped=publisher.dropped,

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 
-from summary import tell
+from summary import report
 from waiting import eventually
 
 import rosglass
@@ -57,7 +57,7 @@ try:
     loopback("up")
     up = time.monotonic()
     eventually(lambda: got[-1] > up and str(node.status()).startswith("CONNECTED: router"))
-    tell(lost=next(when for when, state in states if state == "LOST") - down)
+    report(lost=next(when for when, state in states if state == "LOST") - down)
     node.close()
 finally:
     for other in others:

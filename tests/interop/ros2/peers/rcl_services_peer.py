@@ -1,6 +1,6 @@
 """Another rosglass program with parameters, a log and a clock: `rcl_services_peer.py PLAN`.
 
-The plan: {"url", "arguments": what follows --ros-args}. On its standard input it is told
+The plan: {"url", "arguments": what follows --ros-args}. On its standard input it receives
 {"log": text}, {"set": {name: value}}, {"clock": seconds} (which it publishes), {"read": true}.
 Setting "slow" takes a minute.
 """
@@ -11,7 +11,7 @@ import json
 import sys
 import time
 
-from summary import tell
+from summary import report
 
 import rosglass
 from rosglass.comm import ParameterDescriptor, Range
@@ -31,14 +31,14 @@ parameters.declare("slow", 0)
 
 def slowly(values: dict) -> str:
     if "slow" in values:
-        tell(setting=True)
+        report(setting=True)
         time.sleep(60)
     return ""
 
 
 parameters.on_set(slowly)
 clock = node.create_publisher("/clock", "rosgraph_msgs/msg/Clock", rosglass.QoS.clock())
-tell(ready=True)
+report(ready=True)
 for line in sys.stdin:
     request = json.loads(line)
     if "log" in request:
@@ -48,4 +48,4 @@ for line in sys.stdin:
     elif "clock" in request:
         clock.publish(clock={"sec": request["clock"]})
     else:
-        tell(speed=parameters.get("speed"), chatter=node.resolve("chatter"))
+        report(speed=parameters.get("speed"), chatter=node.resolve("chatter"))

@@ -23,7 +23,7 @@ from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from summary import summary, tell
+from summary import report, summary
 from waiting import at_rate, eventually
 
 #: Seconds that the peer waits for what its task needs.
@@ -108,7 +108,7 @@ def subscribe(topic: str, type: str, quiet: bool = False, **qos: Any) -> None:
     """Say what comes: the values, or, if quiet, when each came (nanoseconds of the system)."""
 
     def receive(message: Any) -> None:
-        tell(**{f"received {topic}": time.time_ns() if quiet else plain(message)})
+        report(**{f"received {topic}": time.time_ns() if quiet else plain(message)})
 
     kept.append(node.create_subscription(load(type), topic, receive, profile(**qos)))
 
@@ -124,7 +124,7 @@ def serve(service: str, type: str, delay: float = 0.0) -> None:
         names = set(response.get_fields_and_field_types())
         for name in names & set(request.get_fields_and_field_types()):
             setattr(response, name, getattr(request, name))
-        tell(**{f"served {service}": plain(request)})
+        report(**{f"served {service}": plain(request)})
         return response
 
     kept.append(node.create_service(load(type), service, respond))
@@ -276,13 +276,13 @@ def spin() -> None:
     except ExternalShutdownException:
         pass
     except BaseException as error:
-        tell(spin_ended=repr(error))
+        report(spin_ended=repr(error))
         raise
 
 
 threading.Thread(target=spin, daemon=True).start()
-tell(ready=True)
+report(ready=True)
 for line in sys.stdin:
     request = json.loads(line)
     number = request.pop("number")
-    tell(**{f"done {number}": TASKS[request.pop("do")](**request)})
+    report(**{f"done {number}": TASKS[request.pop("do")](**request)})

@@ -6,7 +6,7 @@ import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from test_msgs.msg import WStrings
 
-# Nothing is lost, whoever finds the other first.
+# Nothing is lost, in whatever order the nodes find each other.
 KEPT = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 

@@ -18,11 +18,11 @@ import rosglass
 from rosglass.bags import Recorder
 from rosglass.comm import IMMEDIATE
 
-#: Where a message's number is: after the header and an empty layout.
+#: The bytes of a message's number: after the header and an empty layout.
 NUMBER = slice(16, 24)
 
 
-def tell(**event: object) -> None:
+def report(**event: object) -> None:
     print(json.dumps(event), flush=True)
 
 
@@ -42,21 +42,21 @@ with rosglass.connect(url, "robot") as robot, rosglass.connect(url, "panel") as 
         raw_callback=lambda sample: came.append(int.from_bytes(sample.data[NUMBER], "little")),
         executor=IMMEDIATE,
     )
-    sent, told = 0, 0.0
+    sent, reported = 0, 0.0
     while True:
         sent += 1
         numbers.publish(data=sent.to_bytes(8, "little") + os.urandom(size))
         try:
             status = recorder.status()
         except rosglass.BagError as error:
-            tell(error=str(error))
+            report(error=str(error))
             break
-        if time.monotonic() - told > 0.05:
-            told = time.monotonic()
-            tell(state={"at": told, "came": came[-1], "recorded": status.messages})
+        if time.monotonic() - reported > 0.05:
+            reported = time.monotonic()
+            report(state={"at": reported, "came": came[-1], "recorded": status.messages})
         time.sleep(0.005)
     try:
         recorder.close()
     except rosglass.BagError as error:
-        tell(closed=str(error))
+        report(closed=str(error))
     recorder.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 
-from summary import VALUES, summary, tell
+from summary import VALUES, report, summary
 from waiting import at_rate
 
 import rosglass
@@ -20,7 +20,7 @@ qos = rosglass.QoS.latched() if plan.get("latched") else rosglass.QoS(plan.get("
 
 
 def receiver(topic: str):
-    return lambda message: tell(received=topic, value=summary(message.to_dict()))
+    return lambda message: report(received=topic, value=summary(message.to_dict()))
 
 
 for topic, name in plan.get("subscribe", {}).items():
@@ -30,9 +30,9 @@ publishers = {
     topic: (node.create_publisher(topic, name, qos), VALUES[name])
     for topic, name in plan.get("publish", {}).items()
 }
-tell(ready=True)
+report(ready=True)
 for _ in at_rate(plan.get("period", 0.1), plan.get("count")):
     for publisher, value in publishers.values():
         publisher.publish(value)
-tell(published=True)
+report(published=True)
 sys.stdin.read()  # until the tests end

@@ -7,7 +7,7 @@ import sys
 import threading
 from pathlib import Path
 
-from summary import VALUES, summary, tell
+from summary import VALUES, report, summary
 from waiting import at_rate
 from zenoh_ros2_sdk import message_registry
 from zenoh_ros2_sdk.discovery import get_topic_info
@@ -44,7 +44,7 @@ def build(type_name: str, value: dict) -> dict:
 
 
 def receiver(topic: str):
-    return lambda message: tell(received=topic, value=summary(message))
+    return lambda message: report(received=topic, value=summary(message))
 
 
 subscribers = [
@@ -62,12 +62,14 @@ def answer() -> None:
         topic = json.loads(line)["info"]
         info = get_topic_info(topic, plan["domain"], "127.0.0.1", plan["port"], verbose=True)
         ends = [*info.publishers, *info.subscribers] if info else []
-        tell(info=[[e.node_namespace, e.node_name, e.topic_type, e.type_hash, e.qos] for e in ends])
+        report(
+            info=[[e.node_namespace, e.node_name, e.topic_type, e.type_hash, e.qos] for e in ends]
+        )
 
 
 answering = threading.Thread(target=answer, daemon=True)
 answering.start()
-tell(ready=True)
+report(ready=True)
 built = {topic: build(name, VALUES[name]) for topic, (_, name) in publishers.items()}
 for _ in at_rate(0.1, plan.get("count")):
     for topic, (publisher, _) in publishers.items():

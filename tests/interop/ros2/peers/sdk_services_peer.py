@@ -12,7 +12,7 @@ import sys
 import threading
 from pathlib import Path
 
-from summary import tell
+from summary import report
 from zenoh_ros2_sdk import message_registry
 from zenoh_ros2_sdk.service_client import ROS2ServiceClient
 from zenoh_ros2_sdk.service_server import ROS2ServiceServer
@@ -42,28 +42,28 @@ def serve():
     def ignore():
         while True:
             kept.append(ignoring.take_request())
-            tell(ignored=True)
+            report(ignored=True)
 
     kept = []
     threading.Thread(target=ignore, daemon=True).start()
-    tell(ready=True)
+    report(ready=True)
     while True:
         held = [holding.take_request() for _ in range(5)]
-        tell(held=5)
+        report(held=5)
         for key, request in reversed(held):
             holding.send_response(key, holding.response_msg_class(sum=request.a + request.b))
 
 
 def call():
-    tell(ready=True)
+    report(ready=True)
     name = plan.get("service", "/add")
     client = ROS2ServiceClient(name, ADD, timeout=5.0, node_name="caller", **common)
     for first, second in plan["pairs"]:
         response = client.call(a=first, b=second)
         if response is None:
-            tell(failed="no response")
+            report(failed="no response")
         else:
-            tell(sum=int(response.sum))
+            report(sum=int(response.sum))
 
 
 {"serve": serve, "call": call}[plan["do"]]()

@@ -11,7 +11,7 @@ import threading
 import time
 from concurrent.futures import Future
 
-from summary import tell
+from summary import report
 from waiting import eventually
 
 import rosglass
@@ -27,7 +27,7 @@ def fail(request):
 
 
 def never(request):
-    tell(asked=True)
+    report(asked=True)
     return Future()
 
 
@@ -44,33 +44,33 @@ def offer():
     node.create_service_server("/fail", TRIGGER, fail)
     node.create_service_server("/never", TRIGGER, never)
     node.create_action_server("/count", FIBONACCI, count, accept=lambda goal: goal.order < 1000)
-    tell(ready=True)
+    report(ready=True)
 
 
 def use():
     add = node.create_service_client("/my/add", ADD)
     sums = [add.call_async({"a": value, "b": 1}) for value in range(20)]
-    tell(sums=[call.result(10).sum for call in sums])
+    report(sums=[call.result(10).sum for call in sums])
     feedback = []
     client = node.create_action_client("/my/count")
     client.wait_for_server(10)
     goal = client.send_goal({"order": 4}, on_feedback=lambda m: feedback.append(len(m.sequence)))
     status, result = goal.result(10)
     eventually(lambda: len(feedback) >= 3)
-    tell(goal=[status.value, list(map(int, result.sequence)), feedback])
+    report(goal=[status.value, list(map(int, result.sequence)), feedback])
 
 
 def wait():
     """Wait in a call, for Ctrl-C to come."""
     client = node.create_service_client("/never", TRIGGER)
     client.wait_for_server(10)
-    tell(waiting=True)
+    report(waiting=True)
     try:
         client.call(timeout=None)
     except KeyboardInterrupt:
         started = time.monotonic()
         node.close()
-        tell(interrupted=time.monotonic() - started, threads=threading.active_count())
+        report(interrupted=time.monotonic() - started, threads=threading.active_count())
         sys.exit()
 
 

@@ -50,8 +50,8 @@ def summary(value: Any) -> Any:
 _lock = threading.Lock()
 
 
-def tell(**event: Any) -> None:
-    """Print one line in one piece: other threads tell, too, and the log goes the same way."""
+def report(**event: Any) -> None:
+    """Print one line in one piece: other threads report, too, and the log goes the same way."""
     with _lock:
         sys.stdout.write(json.dumps(event) + "\n")
         sys.stdout.flush()

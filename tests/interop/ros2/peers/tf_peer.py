@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 
-from summary import tell
+from summary import report
 
 import rosglass
 from rosglass.tf import StaticTransformBroadcaster, Transform, TransformBroadcaster
@@ -16,11 +16,11 @@ fixed, moving = StaticTransformBroadcaster(node), TransformBroadcaster(node)
 fixed.send_transform(
     [Transform((1.0, 0.0, 0.0), frame_id="base", child_frame_id=name) for name in plan["static"]]
 )
-tell(ready=True)
+report(ready=True)
 for line in sys.stdin:
     request = json.loads(line)
     stamp = rosglass.Time(request["stamp"])
     moving.send_transform(
         Transform((0.0, 2.0, 0.0), stamp=stamp, frame_id="map", child_frame_id="base")
     )
-    tell(sent=True)
+    report(sent=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import time
 
-from summary import tell
+from summary import report
 from two_machines import ROBOT, Cable
 from waiting import eventually
 
@@ -51,7 +51,7 @@ with Cable() as cable:
     unplugged = now()
     call = client.call_async({"a": 3, "b": 4}, timeout=20)
     time.sleep(float(sys.argv[1]) - 0.2)
-    meanwhile = {
+    outage = {
         "status": str(node.status()),
         "publishers": numbers.publisher_count(),
         "problem": numbers.problem,
@@ -63,9 +63,9 @@ with Cable() as cable:
     plugged = now()
     eventually(lambda: got[-1][0] >= plugged + 1 or now() >= plugged + 15)
     count = [number for _, number in got]
-    tell(
+    report(
         before=before,
-        meanwhile=meanwhile,
+        outage=outage,
         call=repr(call.exception(15)),
         after=client.call({"a": 5, "b": 6}, timeout=15).sum,
         lost=next((when for when, state in states if state == "LOST"), 99) - unplugged,

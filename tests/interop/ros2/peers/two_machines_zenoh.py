@@ -10,7 +10,7 @@ import itertools
 import sys
 import time
 
-from summary import tell
+from summary import report
 from two_machines import ROBOT, THERE, Cable
 from waiting import eventually
 
@@ -58,7 +58,7 @@ with Cable() as cable:
     eventually(lambda: got[-1][0] >= plugged + 1 or time.monotonic() - began >= plugged + 10)
     numbers = [number for _, number in got]
     times = [when for when, _ in got]
-    tell(
+    report(
         before=before,
         after=client.call({"a": 5, "b": 6}, timeout=5).sum,
         lost=next(when for when, state in states if state == "LOST") - unplugged,

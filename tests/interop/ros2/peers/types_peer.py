@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 
-from summary import tell
+from summary import report
 from waiting import at_rate
 
 import rosglass
@@ -28,7 +28,7 @@ if mood in ("silent", "liar"):
         other.add_path(plan["lies"])
 
     def respond(request):
-        tell(asked=request.type_name)
+        report(asked=request.type_name)
         if mood == "silent":
             return rosglass.comm.Promise(cancellable=True)
         return describe(Types(other, ""), request.type_name, "", sources=True)
@@ -42,7 +42,7 @@ if mood in ("silent", "liar"):
 
 state = node.create_publisher("/state", "my_msgs/msg/State")
 node.create_subscription(
-    "/command", "my_msgs/msg/State", lambda message: tell(command=message.to_dict())
+    "/command", "my_msgs/msg/State", lambda message: report(command=message.to_dict())
 )
 node.create_service_server(
     "/ask", "my_msgs/srv/Ask", lambda request: {"yes": request.part.a == 5, "text": "ok"}
@@ -57,6 +57,6 @@ def go(goal):
 if plan.get("action"):
     node.create_action_server("/go", "my_msgs/action/Go", go)
 
-tell(ready=True)
+report(ready=True)
 for number in at_rate(0.05, 12_000):
     state.publish(state=number % 200, parts=[{"a": -1}, {"a": 2}], name="Grüße")

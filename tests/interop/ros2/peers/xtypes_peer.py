@@ -11,7 +11,7 @@ from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlEnum, IdlStruct, make_idl_struct
 from cyclonedds.pub import DataWriter
 from cyclonedds.topic import Topic
-from summary import tell
+from summary import report
 from waiting import at_rate
 
 # The plan: "domain".
@@ -69,7 +69,7 @@ writers = [
     (DataWriter(participant, Topic(participant, f"rt/{name}", type(sample))), sample)
     for name, sample in samples.items()
 ]
-tell(ready=True)
+report(ready=True)
 for _ in at_rate(0.1):
     for writer, sample in writers:
         writer.write(sample)
