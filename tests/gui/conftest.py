@@ -48,9 +48,9 @@ def platform(request: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str
     if not QT5:
         return {"QT_QPA_PLATFORM": "offscreen"}
     if "XDG_RUNTIME_DIR" not in os.environ:
-        # Qt 5 warns that it is missing, as it is where nobody is logged in.
+        # Qt 5 warns if it is missing, as on machines without a login session.
         os.environ["XDG_RUNTIME_DIR"] = str(tmp_path_factory.mktemp("runtime"))
-    # Offscreen, Qt 5 needs OpenGL of a display as well, and gives no pictures without it.
+    # Offscreen, Qt 5 needs OpenGL of a display as well, and draws nothing without it.
     display = request.getfixturevalue("screen")
     return {"QT_QPA_PLATFORM": "xcb", "DISPLAY": display, "QT_QUICK_BACKEND": "software"}
 
@@ -174,7 +174,7 @@ class RealWorld:
 # One world shows what differs between Qt versions.
 @pytest.fixture(scope="module", params=["ros1"] if QT5 else ["zenoh", "ros1"])
 def url(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Where a robot and its operator meet: a Zenoh router, a DDS domain, or a ROS 1 master."""
+    """URL that robot and operator share: of a Zenoh router, a DDS domain, or a ROS 1 master."""
     if request.param == "dds":
         pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
         yield f"dds://?domain={request.getfixturevalue('ros_domains')[0]}"
@@ -240,8 +240,8 @@ def screen() -> Iterator[str]:
         command, pass_fds=[writer], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
     os.close(writer)
-    with os.fdopen(reader) as told:
-        number = told.readline().strip()
+    with os.fdopen(reader) as numbers:
+        number = numbers.readline().strip()
     assert number, "Xvfb did not start"
     yield f":{number}"
     server.terminate()
@@ -308,7 +308,7 @@ class Program:
 
 @pytest.fixture
 def start(platform: dict[str, str]) -> Iterator[Callable[..., Program]]:
-    """Start ``rosglass`` with arguments; `display` empty is nobody's, None none at all."""
+    """Start ``rosglass`` with arguments; `display` is an unused one if empty, and unset if None."""
     programs = []
 
     def start(*arguments: Any, display: str | None = "", **extra: str) -> Program:

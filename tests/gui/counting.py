@@ -1,4 +1,4 @@
-"""What tests of action clients in QML share: the robot's side, and a root object with a client."""
+"""Shared by tests of action clients in QML: the robot's side, and a root object with a client."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ class CockpitProcess:
             **os.environ,
             "DISPLAY": display,
             "QT_QPA_PLATFORM": "xcb",
-            # The tests read the picture that the operator would see, from the same renderer.
+            # The tests read the frame that the operator would see, from the same renderer.
             "QSG_RENDER_LOOP": "threaded",
             "QT_LOGGING_RULES": "qt.multimedia.*=false",
         }
@@ -166,7 +166,7 @@ class _Driver:
         act(self.cockpit.window, getattr(self._core.Qt.Key, key))
 
     def repeat(self, key: str) -> None:
-        # As from the X server: the press waits in the queue however busy the program is meanwhile.
+        # As from the X server: the press waits in the queue, however busy the program is.
         loop, pressed = self._core.QEventLoop(), []
 
         def press() -> None:

@@ -59,12 +59,12 @@ function calls(value) {
             ["std_msgs/String", "/fuzz", value(), value()], [value(), value(), value(), value(), value(), value()]]
 }
 
-// `how` is what the object is called, what its members are unless it tells them itself, and whether
+// `how` is what the object is called, the members of one that does not list them itself, and whether
 // to be quick.
 function drive(host, object, other, how) {
-    const [name, told, few] = how
+    const [name, listed, few] = how
     item = other
-    for (const member of told || members(object)) {
+    for (const member of listed || members(object)) {
         let kind = ""
         try { kind = typeof object[member] } catch (e) { }
         if (kind === "function") {

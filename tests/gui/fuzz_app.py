@@ -32,7 +32,7 @@ NUMBERS = count()
 KEPT: list[Any] = []
 #: Seconds that one call may take.
 LIMIT = 10
-#: What functions of the modules hand out.
+#: Objects that functions of the modules return.
 GIVEN = {
     "Ros2": {
         "publisher": "Ros2.createPublisher('/text', 'std_msgs/msg/String')",
@@ -65,7 +65,7 @@ GIVEN = {
 
 
 class Host(QtCore.QObject):
-    """What the JavaScript side is given."""
+    """The object that the JavaScript side gets."""
 
     def __init__(self, last: Path) -> None:
         super().__init__()
@@ -149,7 +149,7 @@ class Fuzz:
 def drive(
     fuzz: Fuzz, uri: str, name: str, made: str, few: bool, members: list[str] | None = None
 ) -> None:
-    """Drive one object; `members` for one that does not tell them itself."""
+    """Drive one object; `members` for one that does not list them itself."""
     words = json.dumps([name, members, few])
     body = f"""property var made: {made}
         function go() {{ Fuzz.drive(host, made, root, {words}) }}"""
@@ -159,7 +159,7 @@ def drive(
     spin(10)
     item = root.property("made")
     if not few and isinstance(item, QtCore.QObject):
-        # A slot that is none gives the object members of its own, after which QML, which
+        # A method that is not a slot gives the object members of its own, after which QML, which
         # remembers them by address, may miss those of the next object.
         added = members_of(item.metaObject()) - members_of(type(item).staticMetaObject)
         assert not added, f"{name}: not decorated with @Slot: {added}"
@@ -180,7 +180,7 @@ def singletons(fuzz: Fuzz, uri: str, few: bool) -> None:
     """Drive what is there without being made."""
     for native in MODULES[uri].NATIVE:
         name = native.removesuffix("Native")
-        # On Qt 5 a singleton does not tell them.
+        # On Qt 5 a singleton does not list them.
         members = sorted(members_of(MODULES[uri].NATIVE[native].staticMetaObject))
         drive(fuzz, uri, name, name, few, members)
         fuzz.start()

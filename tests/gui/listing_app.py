@@ -1,4 +1,4 @@
-"""Run by test_listing1.py on a virtual screen: shows a QML file, drags and clicks as told.
+"""Run by test_listing1.py on a virtual screen: shows a QML file, drags and clicks on request.
 
 Arguments: a QML file and a URL. Reads a command a line: ``drag X Y X Y``, ``click X Y``,
 ``pixel X Y``, ``save FILE``, ``end``; answers each with a line.

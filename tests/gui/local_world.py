@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Publisher, Subscription
     from rosglass.comm.graph import Graph
 
-#: What every node has by itself.
+#: The topics that every node has by itself.
 _OWN = {"/clock", "/parameter_events", "/rosout"}
 
 
@@ -27,7 +27,7 @@ class LocalWorld:
         nodes: Those that are open.
         publishers: What their users publish, in order of appearance.
         subscriptions: What they subscribe to.
-        missing: Names of types that nobody knows.
+        missing: Names of types that no node knows.
         held_back_s: For how long the network holds back what is sent, in seconds.
     """
 
@@ -104,18 +104,18 @@ class _End(LocalMiddleware):
     def __init__(self, world: LocalWorld, url: str) -> None:
         super().__init__(f"local://{world.name}")
         self._world = world
-        self._told = Status(ConnectionState.CONNECTED, f"connected to {url}")
+        self._status = Status(ConnectionState.CONNECTED, f"connected to {url}")
 
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
         super().open(graph, changed)
         self._changed = changed
 
     def set_status(self, status: Status) -> None:
-        self._told = status
+        self._status = status
         self._changed()
 
     def status(self) -> Status:
-        return self._told
+        return self._status
 
     def stamp(self) -> tuple[int, int | None]:
         now, _ = super().stamp()

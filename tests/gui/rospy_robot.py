@@ -1,6 +1,6 @@
 """Run by Debian's own Python: a robot of rospy, with camera, wheels and flashlight.
 
-Prints a JSON object for each thing it is told.
+Prints a JSON object for each message and request that it receives.
 """
 
 import json
@@ -15,12 +15,12 @@ WIDTH, HEIGHT = 320, 240
 ORANGE = bytes((230, 120, 20))
 
 
-def tell(**what):
+def report(**what):
     print(json.dumps(what), flush=True)
 
 
 def switch(request):
-    tell(lamp=request.data)
+    report(lamp=request.data)
     return SetBoolResponse(True, "done")
 
 
@@ -28,9 +28,9 @@ def main():
     rospy.init_node("robot", disable_signals=True)
     topic = "/camera360/pinhole_front/image_rect_color"
     camera = rospy.Publisher(topic, Image, queue_size=1)
-    rospy.Subscriber("/cmd_vel", Twist, lambda m: tell(speed=m.linear.x, turn=m.angular.z))
+    rospy.Subscriber("/cmd_vel", Twist, lambda m: report(speed=m.linear.x, turn=m.angular.z))
     rospy.Service("/flashlight", SetBool, switch)
-    tell(ready=True)
+    report(ready=True)
     picture = Image(width=WIDTH, height=HEIGHT, encoding="rgb8", step=3 * WIDTH)
     picture.data = ORANGE * (WIDTH * HEIGHT)
     rate = rospy.Rate(15)

@@ -59,8 +59,8 @@ def test_a_goal(client: Client, counter: Counter, wait: Any) -> None:
     assert client.run("[client.name, client.actionType === client.type, client.isServerReady()]")
     client.run("send(5)")
     assert client.run("[handle.status, handle.isActive]") == [0, True]
-    told = client.until("result")
-    assert told[:3] == [True, 4, 5]
+    result = client.until("result")
+    assert result[:3] == [True, 4, 5]
     assert client.of("response") == [[True]]
     assert client.of("feedback")[0] == [3]
     codes = [code for (code,) in client.of("status")]
@@ -101,12 +101,12 @@ def test_an_aborted_and_a_rejected_goal(client: Client, counter: Counter, wait: 
     counter.offer()
     wait(lambda: client.run("client.ready"))
     client.run("send(13)")
-    told = client.until("result")
-    assert told[:2] == [True, 6]
-    assert "unlucky" in told[3] or not counter.ros1
+    result = client.until("result")
+    assert result[:2] == [True, 6]
+    assert "unlucky" in result[3] or not counter.ros1
     client.run("log = []; send(0)")
-    told = client.until("result")
-    assert told[1:3] == [6, None]
+    result = client.until("result")
+    assert result[1:3] == [6, None]
     assert client.of("response") == [[False]]
     assert client.run("[handle.status, handle.isActive]") == [6, False]
 
@@ -182,7 +182,7 @@ WATCHED = """
             client.cancelFailed.connect(function (reason) { failed.push(["client", reason]) })
         }
         function cancelAll() { client.cancelAllGoals() }
-        function told() { return JSON.stringify(failed) }
+        function failures() { return JSON.stringify(failed) }
     }
 """
 
@@ -199,10 +199,10 @@ def watched(live: Bench, counter: Counter, module: str) -> Any:
 
 
 @pytest.mark.parametrize("module", ["Ros 1.0", "Ros2 1.0"])
-def test_cancelling_that_fails_is_told(
+def test_failed_cancel_is_reported(
     live: Bench, counter: Counter, wait: Any, module: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Refused by the server; on ROS 1, where nobody can refuse, not answered in time."""
+    """Refused by the server; on ROS 1, where a server cannot refuse, not answered in time."""
     if counter.ros1:  # ten seconds else
         monkeypatch.setattr(ClientGoal.cancel, "__defaults__", (1.0,))
     counter.offer(cancel=lambda _: False)
@@ -211,15 +211,15 @@ def test_cancelling_that_fails_is_told(
     root.send()
     wait(lambda: root.status() == 2)
     root.cancel()
-    wait(lambda: root.told() != "[]")
-    ((who, reason),) = json.loads(root.told())
+    wait(lambda: root.failures() != "[]")
+    ((who, reason),) = json.loads(root.failures())
     assert who == "goal"
     assert ("did not acknowledge within" if counter.ros1 else "refuses to cancel") in reason
     assert root.status() in (2, 3)
 
 
 @pytest.mark.parametrize("module", ["Ros 1.0", "Ros2 1.0"])
-def test_cancelling_what_nobody_hears_of_any_more_is_told(
+def test_cancelling_without_a_node_is_reported(
     live: Bench, counter: Counter, wait: Any, module: str, caplog: Any
 ) -> None:
     counter.offer()
@@ -233,10 +233,10 @@ def test_cancelling_what_nobody_hears_of_any_more_is_told(
     root.cancel()
     wait(lambda: live.session.node is None)
     root.cancelAll()
-    told = json.loads(root.told())
-    assert [who for who, _ in told] == ["goal", "client"]
-    assert "no further news of it will arrive" in told[0][1]
-    assert told[0][1] in caplog.text
+    failures = json.loads(root.failures())
+    assert [who for who, _ in failures] == ["goal", "client"]
+    assert "no further news of it will arrive" in failures[0][1]
+    assert failures[0][1] in caplog.text
 
 
 @pytest.mark.both_qt
@@ -253,7 +253,7 @@ def test_misuse_throws(live: Bench, counter: Counter, wait: Any) -> None:
         }}
     """)
     wait(root.ready)
-    for script, told in (
+    for script, message in (
         ("client.sendGoalAsync({order: 'x'})", "Goal: order: expected"),
         ("client.sendGoal({odrer: 1})", "odrer"),
         ("client.sendGoalAsync({order: 1}, {onFeedbak: function () {}})", "no callback onFeedbak"),
@@ -267,7 +267,7 @@ def test_misuse_throws(live: Bench, counter: Counter, wait: Any) -> None:
     ):
         text = root.tried(script)
         assert text.startswith("Error:"), script
-        assert told in text, text
+        assert message in text, text
     assert counter.server.goals == ()
 
 
@@ -275,27 +275,27 @@ def test_no_server(live: Bench, counter: Counter, wait: Any, caplog: Any) -> Non
     root: Any = live.load(f"""
         QtObject {{
             property var client: Ros2.createActionClient("/nowhere", "{counter.type}")
-            property string told
+            property string answers
             Component.onCompleted: {{
                 client.connectionTimeout = 300
                 client.sendGoalAsync({{order: 3}}, {{
-                    onGoalResponse: function (handle) {{ told += handle }},
-                    onResult: function (r) {{ told += [r.code, r.goalId !== null, r.reason] }}
+                    onGoalResponse: function (handle) {{ answers += handle }},
+                    onResult: function (r) {{ answers += [r.code, r.goalId !== null, r.reason] }}
                 }})
             }}
         }}
     """)
-    wait(lambda: "," in root.property("told"))  # the response, then the result
-    assert root.property("told").startswith("null0,true,")
-    assert "/nowhere" in root.property("told")
+    wait(lambda: "," in root.property("answers"))  # the response, then the result
+    assert root.property("answers").startswith("null0,true,")
+    assert "/nowhere" in root.property("answers")
     assert "no goal could be sent to /nowhere within 0." in caplog.text
 
 
 def test_a_goal_taken_back_before_there_is_a_server(client: Client, wait: Any) -> None:
     client.run("send(3)")
     client.run("handle.cancel()")
-    told = client.until("result")
-    assert told[1] == 5
+    result = client.until("result")
+    assert result[1] == 5
     assert client.of("response") == [[False]]
 
 
@@ -324,9 +324,9 @@ def test_the_interface_shuts_down_and_starts_again(
     client.run("send(50)")
     client.until("feedback")
     live.session.shutdown()
-    told = client.until("result")
-    assert told[1:3] == [0, None]
-    assert "shut down" in told[3]
+    result = client.until("result")
+    assert result[1:3] == [0, None]
+    assert "shut down" in result[3]
     assert client.run("[handle.isActive, client.ready]") == [False, False]
     live.session.init("ui")
     wait(lambda: client.run("client.ready"))
@@ -348,7 +348,7 @@ def test_the_type_is_the_servers(live: Bench, counter: Counter, wait: Any) -> No
     wait(lambda: root.property("count") == 6)
 
 
-def test_a_goal_nobody_will_hear_of_any_more(client: Client, counter: Counter, wait: Any) -> None:
+def test_goal_of_a_lost_server_ends(client: Client, counter: Counter, wait: Any) -> None:
     counter.offer()
     wait(lambda: client.run("client.ready"))
     client.run("send(50)")
@@ -361,7 +361,7 @@ def test_a_goal_nobody_will_hear_of_any_more(client: Client, counter: Counter, w
 
 
 @pytest.mark.both_qt
-def test_nobody_holds_the_client(live: Bench, counter: Counter, wait: Any) -> None:
+def test_client_without_references_stays_alive(live: Bench, counter: Counter, wait: Any) -> None:
     """It stays, and so do its goals, until these have ended."""
     counter.offer()
     counter.go.clear()

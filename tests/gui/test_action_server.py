@@ -141,13 +141,13 @@ def test_a_handle(live: Bench, robot: Robot, wait: Any) -> None:
     ]
     assert run(root, "handle.goalId") == goal.id_text
     assert run(root, "handle.status === ActionGoalStatus.Executing && handle.goalStamp.sec > 0")
-    for script, told in (
+    for script, message in (
         ("handle.publishFeedback({sequence: ['x']})", "sequence[0]"),
         ("handle.succeed({sequnce: []})", "sequnce"),
         ("handle.canceled()", "there was no request to cancel"),
     ):
         text = run(root, f"(function () {{ try {{ {script} }} catch (e) {{ return '' + e }} }})()")
-        assert told in text, text
+        assert message in text, text
     run(root, "handle.publishFeedback({sequence: [1, 2]})")
     wait(lambda: robot.feedback == [[1, 2]])
     live.engine.collectGarbage()
@@ -162,7 +162,7 @@ def test_a_handle(live: Bench, robot: Robot, wait: Any) -> None:
     assert "ended" in text
 
 
-def test_a_forgotten_cancel_is_told_of(
+def test_forgotten_cancel_is_logged(
     live: Bench, robot: Robot, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr("rosglass.qml.elements.goal_handle._REMINDER", 50)
@@ -441,7 +441,7 @@ def test_ros1_servers(live: Bench, robot: Robot) -> None:
 
 
 def test_misused_makers_throw(live: Bench) -> None:
-    for script, told in (
+    for script, message in (
         ('Ros2.createActionServer("/x", "a/B", 5)', "a function that executes goals"),
         ('Ros2.createActionServer("/x", "a/B", {accept: function () {}})', "with execute"),
         ('Ros2.createActionServer("/x", "a/B", {execute: 5})', "execute is not a function"),
@@ -450,7 +450,7 @@ def test_misused_makers_throw(live: Bench) -> None:
     ):
         text = live.run(f"try {{ {script} }} catch (e) {{ return String(e) }}; return ''")
         assert text.startswith("Error:"), script
-        assert told in text, text
+        assert message in text, text
 
 
 def test_the_example(live: Bench, robot: Robot, wait: Any) -> None:

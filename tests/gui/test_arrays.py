@@ -45,7 +45,7 @@ def test_arrays_change(bench: Any, count: int, script: str, change: Any) -> None
 
 
 @pytest.mark.parametrize("count", [3, 200])
-def test_what_is_taken_out_is_returned(bench: Any, count: int) -> None:
+def test_removed_elements_are_returned(bench: Any, count: int) -> None:
     script = "return [r.pop(), r.shift(), r.spliceList(0, 1, []) === undefined, r.at(999)]"
     assert ranges(bench, count, script) == [count, 1, True, None]
 
@@ -149,7 +149,9 @@ def test_typed_arrays_and_buffers_fit(
         ("tf2_msgs/msg/TFMessage", "{transforms: new Uint8Array(3)}", "an array"),
     ],
 )
-def test_what_fits_no_array_is_named(bench: Any, type_name: str, script: str, reason: str) -> None:
+def test_value_of_a_wrong_type_is_named(
+    bench: Any, type_name: str, script: str, reason: str
+) -> None:
     with pytest.raises(ConversionError, match=reason):
         convert(bench, type_name, script)
 

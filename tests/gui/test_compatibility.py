@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-# PySide2 cannot tell what a type inherits; the members are the same files' on both Qt versions.
+# PySide2 does not show a type's base; the members are the same files' on both Qt versions.
 if find_spec("PySide6") is None:
     pytest.skip("the page is made from the types as Qt 6 sees them", allow_module_level=True)
 

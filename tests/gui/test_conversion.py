@@ -1,4 +1,4 @@
-"""What QML gives for messages: everything the plugins take without loss, in both modules."""
+"""Values that QML gives for messages: all that the plugins take without loss, in both modules."""
 # ruff: noqa: N802 - item models have Qt's names
 
 from __future__ import annotations

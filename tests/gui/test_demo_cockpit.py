@@ -119,7 +119,7 @@ def cockpit(window: CockpitProcess, robot: RobotSide) -> Iterator[CockpitProcess
 
 
 def grab(cockpit: CockpitProcess, path: Path, part: str) -> np.ndarray:
-    """Return what the window shows of the camera, or only of its picture, rows of RGB."""
+    """Return the window's view of the camera, or only the image in it, as rows of RGB."""
     from PySide6.QtGui import QImage
 
     cockpit.grab(path)
@@ -150,7 +150,7 @@ def test_the_window_shows_a_picture_that_is_not_older_than_it_claims(
 ) -> None:
     picture = picture_of(cockpit, tmp_path / "live.png")
     assert picture.shape[0] / picture.shape[1] == pytest.approx(HEIGHT / WIDTH, abs=0.02)
-    # Grabbing the screen takes its share; the cockpit calls a picture stale after 3 s.
+    # Grabbing the screen takes its share; the cockpit calls an image stale after 3 s.
     new = tmp_path / "new.png"
     eventually(lambda: code_in(picture_of(cockpit, new)).age(time.time_ns()) < 2.0)
     later = picture_of(cockpit, tmp_path / "later.png")
@@ -372,7 +372,7 @@ def test_diagnostics_are_merged_worst_first_and_counted(
     assert cockpit.get("more", "text") == f"{hidden} more"
     for publisher in (arm, base):
         publisher.close()
-    # What its node says no more about is no news.
+    # The statuses of a node that has left become stale.
     cockpit.until("diagnostics", "note", "22 stale")
 
 
@@ -422,7 +422,7 @@ def test_a_second_finger_stops_while_the_first_one_drives(
     cockpit.touch(("release", 1, "stick", 0.5, 0.15), ("release", 2, "mushroom", 0.5, 0.5))
 
 
-def test_a_stop_by_somebody_else_is_shown_and_not_undone(
+def test_stop_by_another_operator_is_shown_and_not_undone(
     cockpit: CockpitProcess, robot: RobotSide
 ) -> None:
     other = robot.node.create_publisher("/emergency_stop", "std_msgs/msg/Bool")

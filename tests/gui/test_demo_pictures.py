@@ -1,4 +1,4 @@
-"""The map and the scan as pictures, and the figures of the demo."""
+"""The map and the scan as images, and the figures of the demo."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def test_pictures_of_other_cameras_are_only_counted() -> None:
     assert (figures.frames, figures.missing, list(figures.latencies)) == (1, 0, [])
 
 
-def test_latency_of_nothing_is_no_number() -> None:
+def test_latency_without_samples_is_nan() -> None:
     assert math.isnan(Latency.of([]).median)
     assert Latency.of([0.01, 0.02, 0.03]) == Latency(3, 20.0, pytest.approx(29.0), 30.0)
 

@@ -22,7 +22,7 @@ HEAD = """import QtQuick
 import QtQuick.Controls
 import QtQuick.Layouts
 """
-#: What a snippet takes for granted, by page.
+#: Objects that a page's snippets refer to.
 GIVEN = {
     "scene.md": "SceneView { id: view } ListModel { id: marks }",
     "Time.md": 'Subscription { id: sub; topic: "/scan" }\nproperty color color',

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-# PySide2 cannot tell what a type inherits; the members are the same files' on both Qt versions.
+# PySide2 does not show a type's base; the members are the same files' on both Qt versions.
 if find_spec("PySide6") is None:
     pytest.skip("members are read from the types as Qt 6 sees them", allow_module_level=True)
 
@@ -43,19 +43,19 @@ def types(app: Any) -> Any:
 
 
 def test_every_type_has_one_page(types: Any) -> None:
-    told = [one for text in PAGES.values() for one in named(text)]
-    assert sorted(told) == sorted({*types, *COMPOSED})
+    described = [one for text in PAGES.values() for one in named(text)]
+    assert sorted(described) == sorted({*types, *COMPOSED})
 
 
 @pytest.mark.parametrize("name", sorted(PAGES))
-def test_a_page_tells_all_members(name: str, types: Any) -> None:
+def test_page_describes_all_members(name: str, types: Any) -> None:
     text = re.sub(r"```.*?```", "", PAGES[name], flags=re.DOTALL)
-    told = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`\n]+)`", text))))
+    described = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`\n]+)`", text))))
     missing = [
         f"{module}: {kind}.{member}"
         for module, kind in sorted(named(text) - COMPOSED)
         for member in types[module, kind]
-        if member not in told
+        if member not in described
     ]
     assert missing == []
 

@@ -1,4 +1,4 @@
-"""Every example in QML runs as its reader would start it, beside a robot, and leaves a picture."""
+"""Every example in QML runs as its reader starts it, beside a robot, and saves a screenshot."""
 
 from __future__ import annotations
 
@@ -109,8 +109,8 @@ def test_it_runs(file: Path, world: str, screen: str, start: Any, tmp_path: Path
     arguments = ["run", file, "--url", world, "--screenshot", target, "--after", "1"]
     program = start(*arguments, display=screen)
     code = program.end(60)
-    told = [line for line in program.lines if "WARNING" in line or "ERROR" in line]
-    assert (code, told) == (0, []), program.text
+    logged = [line for line in program.lines if "WARNING" in line or "ERROR" in line]
+    assert (code, logged) == (0, []), program.text
     picture = QtGui.QImage(str(target))
     assert (picture.width(), picture.height()) >= (300, 200)
     colours = {
@@ -193,7 +193,7 @@ SIGNS = {
     "tf_transforms": "#ff0000",
     "time": "#ff0000",
 }
-#: What Qt and JavaScript say about mistakes in a file.
+#: Phrases of Qt and JavaScript about mistakes in a file.
 MISTAKES = ("is not defined", "TypeError", "ReferenceError", "Unable to assign", "Cannot read")
 
 
@@ -229,7 +229,7 @@ class Operated:
 
     @property
     def mistakes(self) -> list[str]:
-        """What the log says about mistakes in the example."""
+        """The log's lines about mistakes in the example."""
         return [line for line in self.program.lines if any(word in line for word in MISTAKES)]
 
     def close(self) -> None:

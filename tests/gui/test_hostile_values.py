@@ -132,7 +132,7 @@ def test_text_from_the_network_stays_text(running: Any, wait: Any, text: str) ->
 
 
 @pytest.mark.parametrize("value", [WEB, f"({{a: {OBJECTS}}})"])
-def test_what_would_take_for_ever_is_refused(bench: Any, tmp_path: Any, value: str) -> None:
+def test_exponential_value_is_refused(bench: Any, tmp_path: Any, value: str) -> None:
     text = bench.run(
         f"try {{ Ros2.io.writeYaml('{tmp_path}/web.yaml', {value}) }} catch (e) {{ return '' + e }}"
     )
@@ -140,7 +140,7 @@ def test_what_would_take_for_ever_is_refused(bench: Any, tmp_path: Any, value: s
     assert not (tmp_path / "web.yaml").exists()
 
 
-def test_what_is_used_twice_is_written_twice(bench: Any, tmp_path: Any) -> None:
+def test_value_used_twice_is_written_twice(bench: Any, tmp_path: Any) -> None:
     file = tmp_path / "twice.yaml"
     assert bench.run(f"const a = {{x: [1]}}; return Ros2.io.writeYaml('{file}', [a, {{b: a}}])")
     assert bench.run(f"return Ros2.io.readYaml('{file}')") == [{"x": [1]}, {"b": {"x": [1]}}]
@@ -174,7 +174,7 @@ def test_the_largest_types_go_to_javascript_and_back(bench: Any, shape: str) -> 
 
 
 @pytest.mark.both_qt
-def test_what_would_block_the_interface_is_refused(
+def test_value_that_blocks_the_interface_is_refused(
     bench: Any, tmp_path: Any, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr("rosglass.qml.engine.from_js._READ_TIMEOUT_S", -1.0)

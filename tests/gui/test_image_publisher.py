@@ -1,4 +1,4 @@
-"""Items published as pictures, on real middleware and, where pixels matter, a real window."""
+"""Items published as images, on real middleware and, where pixels matter, a real window."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def robot(live: Bench, wait: Any) -> Iterator[Robot]:
 
 
 def pixels(message: Any) -> np.ndarray:
-    """Return a received picture as rows x columns x channels, red first."""
+    """Return a received image as rows x columns x channels, red first."""
     data = np.asarray(message.data)
     if hasattr(message, "format"):
         return shown(decompress(data, message.format))
@@ -167,7 +167,7 @@ def test_camera_info_has_the_stamp_of_its_picture(
     assert list(given) == [50, 0, 32, 0, 50, 24, 0, 0, 1]
 
 
-def test_nothing_is_drawn_for_nobody(live: Bench, robot: Robot, wait: Any) -> None:
+def test_nothing_is_drawn_without_subscribers(live: Bench, robot: Robot, wait: Any) -> None:
     other = robot.listen("/elsewhere", IMAGE)
     root: Any = live.load(
         window("rate: 50", "function lazy() { pub.always = false }"),
@@ -185,7 +185,7 @@ def test_nothing_is_drawn_for_nobody(live: Bench, robot: Robot, wait: Any) -> No
     wait(lambda: root.state().startswith("true,true"))
 
 
-def test_always_and_only_when_told(live: Bench, robot: Robot, wait: Any) -> None:
+def test_always_and_rate_zero(live: Bench, robot: Robot, wait: Any) -> None:
     root: Any = live.load(window("rate: 0; always: true"), IMPORTS)
     wait(lambda: root.publish() is True)
     wait(lambda: root.state().startswith("true"))
@@ -194,7 +194,7 @@ def test_always_and_only_when_told(live: Bench, robot: Robot, wait: Any) -> None
     wait(lambda: found or not root.publish())
 
 
-def test_what_comes_too_fast_is_dropped_and_the_newest_sent(
+def test_frames_beyond_the_rate_are_dropped_and_the_newest_is_sent(
     live: Bench, robot: Robot, wait: Any
 ) -> None:
     found = robot.listen("/panel/image", IMAGE)
@@ -242,7 +242,7 @@ def test_changes_while_it_runs(live: Bench, robot: Robot, wait: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("setting", "told"),
+    ("setting", "message"),
     [
         ("rate: -1", "rate -1 is not from 0 to 120"),
         ("rate: NaN", "rate nan is not"),
@@ -255,14 +255,14 @@ def test_changes_while_it_runs(live: Bench, robot: Robot, wait: Any) -> None:
     ],
 )
 def test_impossible_values_are_refused(
-    live: Bench, caplog: Any, wait: Any, setting: str, told: str
+    live: Bench, caplog: Any, wait: Any, setting: str, message: str
 ) -> None:
     live.load(window(setting), IMPORTS)
-    assert told in caplog.text
+    assert message in caplog.text
 
 
 @pytest.mark.parametrize(
-    ("setting", "told"),
+    ("setting", "message"),
     [
         ("source: null", "there is no source"),
         ('encoding: "rgba8"; transport: "compressed"', "JPEG has no transparency"),
@@ -270,14 +270,16 @@ def test_impossible_values_are_refused(
         ('topic: "/no topic"', "no topic"),
     ],
 )
-def test_problems_are_told(live: Bench, robot: Robot, wait: Any, setting: str, told: str) -> None:
+def test_problems_are_reported(
+    live: Bench, robot: Robot, wait: Any, setting: str, message: str
+) -> None:
     text = window("always: true; rate: 20; " + setting)
     name = setting.partition(":")[0]
     for given in ("source: panel;", 'topic: "/panel/image";'):
         if given.startswith(name + ":"):
             text = text.replace(given, "")
     root: Any = live.load(text, IMPORTS)
-    wait(lambda: told in root.problem())
+    wait(lambda: message in root.problem())
 
 
 def test_images_that_subscribers_do_not_receive_are_a_problem(running: Bench, wait: Any) -> None:
@@ -288,7 +290,7 @@ def test_images_that_subscribers_do_not_receive_are_a_problem(running: Bench, wa
     wait(lambda: root.problem() == "")
 
 
-def test_what_is_in_no_window_has_no_picture(live: Bench, wait: Any) -> None:
+def test_item_without_window_is_a_problem(live: Bench, wait: Any) -> None:
     root: Any = live.load(
         """
         Item {

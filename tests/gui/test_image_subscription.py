@@ -230,7 +230,7 @@ def test_malformed_messages_are_named(running: Any, camera: Any, wait: Any) -> N
         ('topic: "/chat"', "not images"),
     ],
 )
-def test_what_cannot_be_shown_is_said(
+def test_unusable_topic_is_a_problem(
     running: Any, camera: Any, wait: Any, properties: str, reason: str
 ) -> None:
     running.robot.create_publisher("/chat", "std_msgs/msg/String")
@@ -334,7 +334,7 @@ def test_pictures_that_a_silent_link_kept_back_are_not_live(
         wait.settled(running.session)
         assert colour(root) == RED
     else:
-        # It was asked to leave pictures on the screen, and says that this one is old.
+        # It is configured to keep old images on the screen, and marks this one as stale.
         wait(lambda: colour(root) == BLUE)
         assert sub.property("stale")
     running.world.held_back_s = 0
@@ -342,7 +342,7 @@ def test_pictures_that_a_silent_link_kept_back_are_not_live(
     wait(lambda: colour(root) == BLUE and not sub.property("stale"))
 
 
-def test_a_camera_that_nobody_publishes_is_told(
+def test_camera_without_publisher_is_logged(
     running: Any, camera: Any, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr("rosglass.qml.elements.element.NO_PEER_MS", 20)
@@ -353,7 +353,7 @@ def test_a_camera_that_nobody_publishes_is_told(
     root.property("sub").setProperty("topic", "/cam")
     wait(lambda: root.property("sub").property("subscribed") and camera.subscription_count())
     load(running, 'topic: "/camera"')
-    # It would have been told of the other one before.
+    # The other one would have been logged before.
     wait(lambda: "/camera: this topic has no publisher" in caplog.text)
     assert caplog.text.count("this topic has no publisher") == 1
 
@@ -368,7 +368,7 @@ def test_a_picture_that_comes_while_its_stream_is_made(
     class Eager(image_stream.ImageStream):
         def __init__(self, *given: Any, **options: Any) -> None:
             super().__init__(*given, **options)
-            answers.append(given[-1]())  # the first picture is there already
+            answers.append(given[-1]())  # the first image is there already
 
     monkeypatch.setattr(image_stream, "ImageStream", Eager)
     root = load(running)

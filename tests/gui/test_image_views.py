@@ -217,7 +217,7 @@ class TestDepth:
         rows = [np.hstack([near, far]), np.hstack([unknown, far])]
         return message(np.vstack(rows).astype(np.uint16), "16UC1")
 
-    def test_near_and_far_are_told_apart_and_unknown_is_black(
+    def test_near_and_far_have_different_colors_and_unknown_is_black(
         self, running: Any, module: str, camera: Any, wait: Any
     ) -> None:
         root = load(running, 'colorMap: "turbo"; minimumDepth: 0.5; maximumDepth: 3')
@@ -266,7 +266,7 @@ class TestDepth:
 
 
 class Filming:
-    """Publishes numbered pictures at a rate, in a thread."""
+    """Publishes numbered images at a rate, in a thread."""
 
     def __init__(self, camera: Any, rate: float) -> None:
         self.count = 0
@@ -304,7 +304,7 @@ class TestThrottle:
         view = root.property("view0")
         view.present = lambda image: shown.append(time.monotonic())
         wait(lambda: len(shown) >= 3)
-        # Between two pictures nothing is received: the robot need not send, nor compress.
+        # Between two images nothing is received: the robot need not send, nor compress.
         wait(lambda: not running.world.subscriptions)
         assert sub.property("subscribed"), "it is about to be fetched"
         stream = next(iter(running.session.streams.values())).stream
@@ -345,13 +345,15 @@ class TestThrottle:
         stream = next(iter(running.session.streams.values()))
         counts = stream.stream.statistics()
         assert counts.shown < counts.received / 3
-        assert sub.property("dropped") < counts.received / 3, "what nobody wanted is not dropped"
+        assert sub.property("dropped") < counts.received / 3, (
+            "images beyond the throttle rate do not count as dropped"
+        )
         assert 0 < sub.property("framerate") < 8
 
     def test_a_repeated_picture_is_not_a_new_one(
         self, running: Any, camera: Any, wait: Any
     ) -> None:
-        """Latched ROS 1 publishers send their last picture to whoever subscribes."""
+        """Latched ROS 1 publishers send their last image to each new subscriber."""
         root = load(running, "throttleRate: 50; timeout: 500")
         sub = root.property("sub0")
         wait(lambda: sub.property("subscribed") and camera.subscription_count())
@@ -436,22 +438,22 @@ class TestSnapshot:
         return running.load(
             f"""Item {{
                 property QtObject view0: ImageItem {{ id: item; width: 64; height: 48 }}
-                property var told: []
+                property var results: []
                 property QtObject sub0: {element} {{
                     id: camera; topic: "/cam"; videoSink: item.videoSink; {properties}
-                    onSnapshotSaved: (path) => told.push("saved " + path)
-                    onSnapshotFailed: (reason) => told.push("failed " + reason)
+                    onSnapshotSaved: (path) => results.push("saved " + path)
+                    onSnapshotFailed: (reason) => results.push("failed " + reason)
                 }}
                 function save(path) {{
-                    camera.saveSnapshot(path).then((p) => told.push("kept " + p),
-                                                   (e) => told.push("refused " + e.message))
+                    camera.saveSnapshot(path).then((p) => results.push("kept " + p),
+                                                   (e) => results.push("refused " + e.message))
                 }}
-                function list() {{ return told.join("|") }}
+                function list() {{ return results.join("|") }}
             }}""",
             "import QtQuick 2.15",
         )
 
-    def test_what_is_shown_is_saved(
+    def test_shown_image_is_saved(
         self, running: Any, module: str, camera: Any, wait: Any, tmp_path: Path
     ) -> None:
         root = self.load(running, "rotation: 90")
@@ -466,7 +468,7 @@ class TestSnapshot:
         np.testing.assert_array_equal(pixels[4::8, 4::8], np.rot90(QUARTERS, -1))
         assert cv2.imread(str(url)).shape == (16, 16, 3)
 
-    def test_what_cannot_be_saved_is_told(
+    def test_snapshot_errors_are_reported(
         self, running: Any, module: str, camera: Any, wait: Any, tmp_path: Path
     ) -> None:
         root = self.load(running)
@@ -504,7 +506,7 @@ def test_the_namespace_of_ros_1(running: Any, wait: Any) -> None:
 
 
 class TestReduction:
-    """Pictures have no more pixels than the screen shows of them."""
+    """Images have no more pixels than the screen shows of them."""
 
     @pytest.fixture
     def window(self, app: Any) -> Iterator[Any]:

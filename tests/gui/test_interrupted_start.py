@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.both_qt
 
-#: How a shell tells it: by the exit code, or the signal that ended the process.
+#: Results of an interrupted process: the exit code, or the signal that ended it.
 INTERRUPTED = {130, -signal.SIGINT}
 STARTS = 12
 FILE = """import QtQuick 2.15

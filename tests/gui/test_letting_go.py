@@ -1,4 +1,4 @@
-"""What elements share is let go when QML destroys them, also in the middle of something."""
+"""Objects that elements share are released when QML destroys them, also in the middle of a job."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Watch(Handle):
 
 @pytest.fixture
 def watches(monkeypatch: pytest.MonkeyPatch) -> list[Handle]:
-    """Who wants to know of changes of transforms."""
+    """The open listeners of changes of transforms."""
     opened: list[Handle] = []
     for name in ("on_change", "on_update", "on_tree_change"):
         plain = getattr(TransformBuffer, name)
@@ -75,19 +75,19 @@ def test_transforms_are_not_followed_any_more(
     wait(lambda: len(watches) == 2)
 
 
-def test_who_leaves_at_once_leaves_no_listener(
+def test_element_that_leaves_at_once_leaves_no_listener(
     running: Bench, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass.qml.elements.tf_buffer import TfLink
 
-    told: list[str] = []
+    calls: list[str] = []
 
     class Listener:
         def __init__(self, *_: Any) -> None:
-            told.append("opened")
+            calls.append("opened")
 
         def close(self) -> None:
-            told.append("closed")
+            calls.append("closed")
 
     monkeypatch.setattr("rosglass.tf.TransformListener", Listener)
     session, node, done = running.session, running.session.node, threading.Event()
@@ -95,7 +95,7 @@ def test_who_leaves_at_once_leaves_no_listener(
     TfLink.join(session, node, "/", "it").leave("it")
     session.background(done.set)
     wait(done.is_set)
-    assert told == ["opened", "closed"]
+    assert calls == ["opened", "closed"]
 
 
 class SlowClient:

@@ -1,4 +1,4 @@
-"""The paper's Listing 1, word for word, on a robot of rospy: picture, driving, flashlight."""
+"""The paper's Listing 1, word for word, on a robot of rospy: image, driving, flashlight."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def panel(url: str, screen: str, robot: Talk) -> Iterator[Talk]:
     made.close()
 
 
-def told(robot: Talk, what: str) -> list[dict[str, Any]]:
+def received(robot: Talk, what: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in robot.lines if what in line]
 
 
@@ -103,13 +103,13 @@ def test_listing1(panel: Talk, robot: Talk, tmp_path: Path) -> None:
     # The camera's orange fills the window; the joystick lies over it.
     until(lambda: panel.ask("pixel 30 60") in {"#e67814", "#e57814", "#e67813"}, panel, robot)
     assert panel.ask("pixel 200 240") == "#aaaaaa"
-    until(lambda: panel.ask("drag 200 240 200 210") and told(robot, "speed"), panel, robot)
-    speed = told(robot, "speed")[-1]
+    until(lambda: panel.ask("drag 200 240 200 210") and received(robot, "speed"), panel, robot)
+    speed = received(robot, "speed")[-1]
     assert speed["speed"] == pytest.approx(0.5, abs=0.05)
     assert speed["turn"] == pytest.approx(0.0, abs=0.05)
     panel.ask("click 40 285")
-    until(lambda: told(robot, "lamp") == [{"lamp": False}], panel, robot)
+    until(lambda: received(robot, "lamp") == [{"lamp": False}], panel, robot)
     panel.ask("click 40 285")
-    until(lambda: told(robot, "lamp") == [{"lamp": False}, {"lamp": True}], panel, robot)
+    until(lambda: received(robot, "lamp") == [{"lamp": False}, {"lamp": True}], panel, robot)
     assert panel.ask(f"save {tmp_path / 'listing1.png'}") == "True"
     assert not [line for line in panel.errors if "Error" in line]

@@ -82,7 +82,7 @@ def test_the_tree_index_is_the_row(bench: Any) -> None:
 
 @pytest.mark.both_qt
 def test_only_values_have_an_edit_role(bench: Any) -> None:
-    """As editors of qml6_ros2_plugin tell names from fields by it, such as RQml's."""
+    """Editors for qml6_ros2_plugin, such as RQml's, distinguish names from fields by it."""
     script = """message = {"#messageType": "geometry_msgs/msg/PointStamped", point: {x: 1.5}}
         const cells = [at([1, 0], 0), at([1, 0], 1)]
         const edit = Qt.EditRole
@@ -115,9 +115,9 @@ def test_leaves_can_be_edited(bench: Any) -> None:
                       setData(at([0, 1], 1), 'map'), setData(at([0, 0, 0], 1), 4)]
         return [done, edits, messages - before, message.point, message.header.frame_id,
                 message.header.stamp.sec, data(at([1, 0], 1), 2)]"""
-    done, edits, told, point, frame, sec, shown = run(bench, script)
+    done, edits, messages, point, frame, sec, shown = run(bench, script)
     assert done == [True] * 4
-    assert (edits, told) == (4, 4)
+    assert (edits, messages) == (4, 4)
     assert point == {"x": 1.5, "y": 2.5, "z": 0}
     assert (frame, sec, shown) == ("map", 4, 1.5)
 
@@ -135,7 +135,7 @@ def test_leaves_can_be_edited(bench: Any) -> None:
         ("[7]", 1, "1"),
     ],
 )
-def test_what_does_not_fit_changes_nothing(bench: Any, rows: str, column: int, value: str) -> None:
+def test_invalid_value_changes_nothing(bench: Any, rows: str, column: int, value: str) -> None:
     script = f"""message = Ros2.createEmptyMessage('geometry_msgs/msg/PointStamped')
         return [setData(at({rows}, {column}), {value}), edits, message]"""
     done, edits, message = run(bench, script)
@@ -228,7 +228,7 @@ def test_the_type_may_be_set_after_the_message(bench: Any) -> None:
 @pytest.mark.parametrize(
     "value", ["{linear: {q: 1}}", "{'#messageType': 'nope/msg/X'}", "5", "'x'", "function() {}"]
 )
-def test_what_is_no_message_leaves_the_last_one(bench: Any, caplog: Any, value: str) -> None:
+def test_invalid_message_leaves_the_last_one(bench: Any, caplog: Any, value: str) -> None:
     script = f"""message = {{'#messageType': 'geometry_msgs/msg/Twist', linear: {{x: 5}}}}
         message = {value}; return message.linear.x"""
     assert run(bench, script) == 5

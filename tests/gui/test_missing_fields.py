@@ -79,10 +79,10 @@ def test_a_typo_is_named_once_in_all_messages(
     # What follows from it is said the first, the tenth ... time.
     assert len([line for line in lines if line.startswith("9: TypeError")]) == 2
     assert "(9 more times)" in "".join(lines)
-    # Asking whether there is such a field is no mistake.
+    # Checking for a field is not a mistake.
     assert not [line for line in lines if line.startswith("13:")]
-    told = [r for r in caplog.records if "no field 'foo'" in r.getMessage()]
-    assert [(r.lineno, r.levelno) for r in told] == [(13, logging.INFO)]
+    logged = [r for r in caplog.records if "no field 'foo'" in r.getMessage()]
+    assert [(r.lineno, r.levelno) for r in logged] == [(13, logging.INFO)]
 
 
 @MODULES

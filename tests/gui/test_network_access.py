@@ -1,4 +1,4 @@
-"""What an interface names on other machines is fetched only where that is allowed."""
+"""Files on other machines are fetched only where that is allowed."""
 
 from __future__ import annotations
 
@@ -66,11 +66,11 @@ Item {
 
 
 class Server:
-    """Another machine, as far as Qt can tell; counts who comes."""
+    """Another machine, from Qt's point of view; counts requests."""
 
     def __init__(self) -> None:
         self._socket = socket.create_server(("127.0.0.1", 0))
-        # For Qt, this is no address of this machine, whose requests pass by all proxies.
+        # Qt does not take this for an address of this machine, whose requests bypass proxies.
         self.address = f"0.0.0.0:{self._socket.getsockname()[1]}"
         self.requests = 0
         threading.Thread(target=self._serve, daemon=True).start()
@@ -125,7 +125,7 @@ def test_an_import_from_another_machine_is_not_fetched(
     assert server.requests == 0
 
 
-def test_what_is_allowed_is_fetched(start: Any, tmp_path: Path, server: Server) -> None:
+def test_allowed_file_is_fetched(start: Any, tmp_path: Path, server: Server) -> None:
     file = interface(tmp_path, server)
     program = start("run", file, "--allow-network", "--screenshot", tmp_path / "shot.png")
     program.end()

@@ -70,7 +70,7 @@ def test_the_program_of_the_page_shows_the_chart(python: Any, tmp_path: Path) ->
     assert [line for line in program.lines if "WARNING" in line or "Error" in line] == []
 
 
-def test_it_refuses_tells_and_ends_like_every_element(
+def test_it_refuses_reports_and_ends_like_every_element(
     element: type, running: Any, wait: Any, caplog: Any
 ) -> None:
     chat = running.robot.create_publisher("/chat", TEXT)

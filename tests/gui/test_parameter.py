@@ -51,14 +51,14 @@ def test_reading_and_setting(live: Bench, wait: Any) -> None:
 
 
 @ROS2
-def test_what_is_known(ros2: Bench, wait: Any) -> None:
+def test_description_is_shown(ros2: Bench, wait: Any) -> None:
     root: Any = ros2.load(QML)
     wait(lambda: root.info().startswith("true,false,double"))
     assert root.info() == "true,false,double,Highest speed,false,0,2,"
 
 
 @ROS2
-def test_refusals_are_told(ros2: Bench, wait: Any, caplog: Any) -> None:
+def test_refused_values_are_reported(ros2: Bench, wait: Any, caplog: Any) -> None:
     root: Any = ros2.load(QML)
     wait(lambda: root.shown() == "1.5")
     root.set(99)
@@ -84,7 +84,7 @@ def test_a_node_that_comes_and_goes(live: Bench, wait: Any) -> None:
         wait(lambda: root.info().startswith("false"))
 
 
-def test_setting_too_early_is_told(bench: Any, caplog: Any) -> None:
+def test_setting_too_early_is_logged(bench: Any, caplog: Any) -> None:
     root: Any = bench.load(QML)
     root.set(1)
     assert "nothing was set" in caplog.text
@@ -115,7 +115,7 @@ def test_a_wrong_name_of_the_node_is_named(live: Bench, wait: Any) -> None:
 
 
 @ROS2
-def test_what_is_wrong_stays_said(ros2: Bench, wait: Any) -> None:
+def test_problem_stays_until_it_is_solved(ros2: Bench, wait: Any) -> None:
     root: Any = ros2.load(QML.replace('"speed"', '"sped"'))
     wait(lambda: "/robot has no parameter 'sped'; did you mean speed?" in root.info())
     ticks: list[None] = []
@@ -139,7 +139,7 @@ def test_nothing_is_pending_without_a_node(live: Bench, wait: Any) -> None:
 
 
 @ROS2
-def test_ready_is_said_of_what_the_node_has_told(live: Bench, wait: Any) -> None:
+def test_ready_follows_the_received_values(live: Bench, wait: Any) -> None:
     """A node that was restarted must not be shown with the values of before as its own."""
     root: Any = live.load("""
         QtObject {
@@ -147,20 +147,20 @@ def test_ready_is_said_of_what_the_node_has_told(live: Bench, wait: Any) -> None
             property Parameter p: Parameter {
                 nodeName: "/arm"; name: "speed"; onReadyChanged: log.push(ready + " " + value)
             }
-            function told() { return log.join() }
+            function states() { return log.join() }
         }
     """)
-    for value, told in ((3, "true 3"), (5, "true 3,false 3,true 5")):
+    for value, states in ((3, "true 3"), (5, "true 3,false 3,true 5")):
         arm = live.world.connect(None, "arm")
         arm.parameters.declare("speed", value)
-        wait(lambda told=told: root.told() == told)
+        wait(lambda states=states: root.states() == states)
         arm.close()
-        wait(lambda told=told: root.told().startswith(f"{told},false"))
+        wait(lambda states=states: root.states().startswith(f"{states},false"))
 
 
 @ROS2
 def test_a_change_that_went_unheard_is_found(ros2: Bench, wait: Any, monkeypatch: Any) -> None:
-    """The first moments after a node appears, its changes may be heard of by nobody."""
+    """The first changes after a node appears may be missed."""
     from rosglass.qml.elements.parameter import ParameterLink
 
     monkeypatch.setattr(ParameterLink, "_on_event", lambda link, event: None)

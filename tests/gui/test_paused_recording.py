@@ -1,4 +1,4 @@
-"""Every element that tells its age shows the moment at which a recording is paused."""
+"""Every element with an age shows the moment at which a recording is paused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot says is shown as it is, however it looks: at run time."""
+"""A robot's text is shown as it is, whatever it contains: at run time."""
 
 from __future__ import annotations
 

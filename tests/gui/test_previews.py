@@ -1,4 +1,4 @@
-"""Previews of several cameras of a real robot: one picture at a time, one camera at a time."""
+"""Previews of several cameras of a real robot: one image at a time, one camera at a time."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Cameras:
 
     def __init__(self, node: Any) -> None:
         self.sent = 0
-        #: Pictures for which nobody was there.
+        #: Images published without subscribers.
         self.unwatched = 0
         self._cameras = [
             node.create_publisher(f"/cam{i}", "sensor_msgs/msg/Image", 1) for i in range(COUNT)
@@ -84,7 +84,7 @@ def test_a_robot_sends_only_what_is_shown(live: Any, cameras: Cameras, wait: Any
         ),
         timeout=60,
     )
-    # Most of the time the robot has nobody to compress and send for.
+    # Most of the time the robot has no subscriber to compress and send for.
     assert cameras.unwatched - unwatched > (cameras.sent - sent) / 2
     for stream, last in zip(streams, before, strict=True):
         now = stream.statistics()

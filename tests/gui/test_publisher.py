@@ -59,10 +59,10 @@ def test_partial_messages_get_defaults(running: Any, received: list, wait: Any) 
 
 
 @pytest.mark.both_qt
-def test_what_does_not_fit_throws_and_is_logged_once_by_qt(
+def test_invalid_message_throws_and_is_logged_once_by_qt(
     running: Any, received: list, messages: None, wait: Any, caplog: Any
 ) -> None:
-    def told() -> list[logging.LogRecord]:
+    def logged() -> list[logging.LogRecord]:
         return [record for record in caplog.records if "linear.x" in record.getMessage()]
 
     root = load(running, "function shout() { pub.publish({linear: {x: 'fast'}}) }")
@@ -70,9 +70,9 @@ def test_what_does_not_fit_throws_and_is_logged_once_by_qt(
     send(root, "fast")
     assert "linear.x" in root.property("error")
     assert "'fast'" in root.property("error")
-    assert not told(), "whoever catches it decides what becomes of it"
+    assert not logged(), "a caller that catches it decides what to do with it"
     root.shout()
-    (record,) = told()
+    (record,) = logged()
     assert record.pathname.endswith(".qml")
     assert record.lineno == 14
     wait.settled(running.session)
@@ -94,7 +94,7 @@ def test_nothing_is_lost_silently_before_and_after(
     assert "connection is lost: no router" in caplog.text
 
 
-def test_what_cannot_be_advertised_in_time_is_told(
+def test_failed_advertising_is_logged(
     running: Any, received: list, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
     go = threading.Event()
@@ -106,8 +106,8 @@ def test_what_cannot_be_advertised_in_time_is_told(
     )
     root = load(running)
     send(root, 1.0)
-    told = "nothing was published on cmd_vel: it could not be advertised in time"
-    wait(lambda: told in caplog.text)
+    message = "nothing was published on cmd_vel: it could not be advertised in time"
+    wait(lambda: message in caplog.text)
     send(root, 2.0)
     go.set()
     wait(lambda: received)
@@ -188,7 +188,7 @@ def test_a_publisher_that_is_let_go_sends_what_it_holds(
     assert received[0].linear.x == 7
 
 
-def test_what_is_held_at_shutdown_is_told(
+def test_messages_held_at_shutdown_are_logged(
     running: Any, received: list, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
     go = threading.Event()
@@ -203,9 +203,7 @@ def test_what_is_held_at_shutdown_is_told(
     assert not received
 
 
-def test_who_forgot_to_ask_for_a_node_is_told(
-    bench: Any, wait: Any, caplog: Any, monkeypatch: Any
-) -> None:
+def test_missing_init_is_reported(bench: Any, wait: Any, caplog: Any, monkeypatch: Any) -> None:
     monkeypatch.setattr("rosglass.qml.engine.session._FORGOTTEN", 20)
     root = load(bench)
     wait(lambda: "nothing is received or sent: no node was asked for" in caplog.text)
@@ -214,9 +212,7 @@ def test_who_forgot_to_ask_for_a_node_is_told(
     assert 'it is not advertised yet; no node was asked for: call Ros2.init("name")' in caplog.text
 
 
-def test_who_asked_for_a_node_is_told_nothing(
-    running: Any, wait: Any, caplog: Any, monkeypatch: Any
-) -> None:
+def test_init_prevents_the_warning(running: Any, wait: Any, caplog: Any, monkeypatch: Any) -> None:
     monkeypatch.setattr("rosglass.qml.engine.session._FORGOTTEN", 0)
     root = load(running)
     wait(lambda: root.property("advertised") == 1)
@@ -330,7 +326,7 @@ def test_keep_all_never_waits_on_the_gui_thread(running: Any, wait: Any) -> None
     assert threads[0] is not threading.main_thread()
 
 
-def test_what_keep_all_could_not_send_is_told(running: Any, wait: Any, caplog: Any) -> None:
+def test_unsent_messages_of_keep_all_are_reported(running: Any, wait: Any, caplog: Any) -> None:
     root = running.load(
         """QtObject {
             property var qos: Ros2.QoS().reliable().keep_all()
@@ -355,14 +351,14 @@ def test_a_topic_without_subscribers_is_named_with_the_near_name(
     for topic in ("/cmd_vel", "/cmd_vell"):
         root = running.load(code.replace("TOPIC", topic))
         wait(lambda root=root: root.property("pub").property("isAdvertised"))
-    # It would have been told of the other one before.
+    # The other one would have been logged before.
     wait(lambda: "/cmd_vell: this topic has no subscription" in caplog.text)
-    (told,) = [one for one in caplog.records if "this topic has no subscription" in one.message]
-    assert told.levelno == logging.WARNING
-    assert "/cmd_vell: this topic has no subscription; did you mean /cmd_vel?" in told.message
+    (warning,) = [one for one in caplog.records if "this topic has no subscription" in one.message]
+    assert warning.levelno == logging.WARNING
+    assert "/cmd_vell: this topic has no subscription; did you mean /cmd_vel?" in warning.message
 
 
-def test_publishing_at_the_end_of_the_program_is_no_mistake(
+def test_publishing_at_the_end_of_the_program_is_not_a_mistake(
     running: Any, wait: Any, caplog: Any
 ) -> None:
     root = load(running)
@@ -380,7 +376,7 @@ def test_publishing_at_the_end_of_the_program_is_no_mistake(
 
 
 @pytest.mark.both_qt
-def test_what_waits_for_its_topic_is_sent_after_the_engine(
+def test_messages_waiting_for_their_topic_are_sent_after_the_engine(
     running: Any, wait: Any, tmp_path: Any
 ) -> None:
     received: list[str] = []

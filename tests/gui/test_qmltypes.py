@@ -1,4 +1,4 @@
-"""What editors and qmllint know of the QML modules."""
+"""Type descriptions of the QML modules for editors and qmllint."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if not QT6:
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = [option for path in IMPORT_PATHS for option in ("-I", str(path))]
-#: What qmllint says of types and members it does not know; the rest is style.
+#: Warnings of qmllint about types and members that it does not know; the others are about style.
 UNKNOWN = {
     "import",
     "incompatible-type",
@@ -179,10 +179,10 @@ class LanguageServer:
         document = {"uri": file.as_uri(), "languageId": "qml", "version": 1}
         self.send("textDocument/didOpen", {"textDocument": {**document, "text": file.read_text()}})
         while True:
-            told = self.receive()
-            found = told.get("params", {}).get("diagnostics")
+            message = self.receive()
+            found = message.get("params", {}).get("diagnostics")
             # The first is said before modules were read.
-            if told.get("method") == "textDocument/publishDiagnostics" and found:
+            if message.get("method") == "textDocument/publishDiagnostics" and found:
                 return [item["message"] for item in found]
 
     def close(self) -> None:
@@ -219,7 +219,7 @@ def test_the_import_path_is_printed() -> None:
     assert done.stdout.strip().split(os.pathsep) == list(map(str, IMPORT_PATHS))
 
 
-def test_settings_that_are_none_are_left_alone(tmp_path: Path) -> None:
+def test_invalid_settings_are_left_alone(tmp_path: Path) -> None:
     settings = tmp_path / ".qmlls.ini"
     settings.write_text("what is this")
     command = [sys.executable, "-m", "rosglass.cli", "qml-path", "--qmlls-ini"]

@@ -1,4 +1,4 @@
-"""Quality of service in QML: every policy, there and back; what becomes of those that clash."""
+"""Quality of service in QML: every policy, there and back, and incompatible profiles."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_a_profile_comes_back_as_it_was_given(running: Any) -> None:
     assert running.run(script) == [250, 1500.5, 2000, "manual_by_topic", 7]
 
 
-def test_the_graph_tells_every_policy(running: Any, wait: Any) -> None:
+def test_graph_shows_every_policy(running: Any, wait: Any) -> None:
     profile = QoS(deadline=Duration(10_000_000), lease_duration=Duration(20_000_000))
     running.robot.create_publisher("/a", "std_msgs/msg/Bool", profile)
     script = """const q = Ros2.getPublishersInfo('/a')[0].qos
@@ -105,7 +105,7 @@ def test_the_graph_tells_every_policy(running: Any, wait: Any) -> None:
         "liveliness_lease_duration(undefined).deadline(null)",
     ],
 )
-def test_limits_that_are_none_are_refused(running: Any, wrong: str) -> None:
+def test_invalid_limits_are_refused(running: Any, wrong: str) -> None:
     script = f"""try {{ Ros2.createPublisher('/a', 'std_msgs/msg/Bool', Ros2.QoS().{wrong}) }}
         catch (e) {{ return e.message }}"""
     assert "milliseconds" in running.run(script)
@@ -118,8 +118,8 @@ def test_a_profile_that_clashes_is_a_problem_on_both_sides(running: Any, wait: A
         property Subscription subscription: Subscription {
             topic: "/b"; messageType: "std_msgs/msg/Bool"; qos: Ros2.QoS().reliable()
         }
-        property int told: 0
-        Component.onCompleted: publisher.problemChanged.connect(() => told += 1)
+        property int changes: 0
+        Component.onCompleted: publisher.problemChanged.connect(() => changes += 1)
         function offered() { return publisher.problem }
         function asked() { return subscription.problem }
     }""")
@@ -130,7 +130,7 @@ def test_a_profile_that_clashes_is_a_problem_on_both_sides(running: Any, wait: A
     running.robot.create_publisher("/b", "std_msgs/msg/Bool", best_effort)
     clash = "reliability: reliable requested, best effort offered"
     wait(lambda: clash in root.offered() and clash in root.asked())
-    assert root.property("told") == 1
+    assert root.property("changes") == 1
 
 
 @EVERY_WIRE

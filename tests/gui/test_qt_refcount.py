@@ -18,7 +18,7 @@ def test_none_keeps_its_references(app) -> None:
     before = sys.getrefcount(None)
     for _ in range(1000):
         app.processEvents()
-    # What other tests have left behind may go meanwhile; the fault takes one per call.
+    # Garbage of other tests may be freed at that time; the fault takes one per call.
     assert sys.getrefcount(None) - before > -500
 
 
@@ -65,7 +65,7 @@ def test_a_second_qt_is_refused(loaded: set, wanted: str, reason: str) -> None:
         choose_binding(frozenset(loaded), wanted)
 
 
-def test_a_missing_qt5_is_told_with_its_packages() -> None:
+def test_missing_qt5_is_reported_with_its_packages() -> None:
     script = """import os, sys
 sys.modules["PySide2"] = None
 os.environ["ROSGLASS_QT"] = "pyside2"

@@ -21,7 +21,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "remote_control.qml"
 
 
 class Robot:
-    """Films a plain colour at 30 Hz and remembers what it was told."""
+    """Films a plain colour at 30 Hz and remembers received commands."""
 
     def __init__(self, url: str) -> None:
         self.node = rosglass.connect(url, "robot")
@@ -54,7 +54,7 @@ class Robot:
             )
 
     def freeze(self) -> None:
-        """Send no more pictures."""
+        """Send no more images."""
         self._ended.set()
         self._thread.join()
 
@@ -101,7 +101,7 @@ def test_dragging_drives_and_letting_go_stops(robot: Robot, view: Any, wait: Any
     wait(lambda: robot.commands)
     test.mouseMove(view, point(200, 195))
     wait(lambda: robot.commands[-1] == (0.75, 0.0))
-    # Held still, it goes on telling the robot, which would otherwise stop by itself.
+    # Held still, it goes on sending, as the robot would stop by itself otherwise.
     count = len(robot.commands)
     wait(lambda: len(robot.commands) > count + 3)
     test.mouseMove(view, point(20, 290))
@@ -118,9 +118,7 @@ def test_dragging_drives_and_letting_go_stops(robot: Robot, view: Any, wait: Any
     assert set(robot.commands[begin:]) == {(0.0, 0.0)}
 
 
-def test_who_holds_the_stick_without_a_live_picture_stops_the_robot(
-    robot: Robot, view: Any, wait: Any
-) -> None:
+def test_held_stick_without_live_image_stops_the_robot(robot: Robot, view: Any, wait: Any) -> None:
     from rosglass.qt import QtCore, optional
 
     test, point, left = optional("QtTest").QTest, QtCore.QPoint, QtCore.Qt.MouseButton.LeftButton
@@ -135,7 +133,7 @@ def test_who_holds_the_stick_without_a_live_picture_stops_the_robot(
     assert set(robot.commands[begin:]) == {(0.0, 0.0)}
 
 
-def test_who_lets_go_before_an_outage_is_noticed_stops_until_the_robot_is_back(
+def test_stick_released_before_an_outage_is_noticed_stops_the_robot(
     robot: Robot, view: Any, wait: Any
 ) -> None:
     from rosglass.qt import QtCore, optional

@@ -46,7 +46,7 @@ def test_opengl_is_chosen_where_it_is_fast_or_needed(
         assert f"{file}:2: ShaderEffect is not drawn" in program.until("is not drawn")
 
 
-def test_what_comes_to_need_opengl_later_is_told(start: Any, screen: str, tmp_path: Path) -> None:
+def test_later_need_of_opengl_is_logged(start: Any, screen: str, tmp_path: Path) -> None:
     file = tmp_path / "Main.qml"
     file.write_text(PLAIN)
     program, line = shown(start, screen, file, "--watch")
@@ -60,7 +60,7 @@ def test_what_comes_to_need_opengl_later_is_told(start: Any, screen: str, tmp_pa
     ("what", "imports"),
     [("MediaPlayer", "import QtMultimedia 5.15"), ("ImagePublisher", "import Ros2 1.0")],
 )
-def test_what_is_no_item_and_needs_opengl_is_told(
+def test_non_visual_element_that_needs_opengl_is_logged(
     what: str, imports: str, start: Any, screen: str, tmp_path: Path
 ) -> None:
     from rosglass.qt import QT6
@@ -79,7 +79,7 @@ def test_what_is_no_item_and_needs_opengl_is_told(
 def test_a_thread_of_qt_is_not_made_to_wait_for_python(
     start: Any, screen: str, tmp_path: Path
 ) -> None:
-    """Grabbing the window waits for what draws, which would wait for Python to paint a picture."""
+    """Grabbing a window waits for its render thread, which must not wait for Python to paint."""
     file = tmp_path / "Main.qml"
     file.write_text(
         """import QtQuick 2.15

@@ -178,7 +178,7 @@ def test_ages_follow_slow_time_but_not_fast_time(live: Bench, drive: Path, wait:
     before, began = steady(), time.monotonic()
     wait.nothing_happens(0.2)
     distance = steady() - before
-    # The recording begins again many times meanwhile, by its three seconds each.
+    # In that time, the recording begins again many times, by its three seconds each.
     assert distance % 3 < time.monotonic() - began + 0.5
 
 
@@ -198,9 +198,7 @@ def test_the_robot_is_back_when_the_element_is_gone(live: Bench, drive: Path, wa
     wait(lambda: live.session.url == robot and live.session.state == "connected")
 
 
-def test_of_two_recordings_the_newer_wish_wins(
-    live: Bench, drive: Path, tmp_path: Path, wait: Any
-) -> None:
+def test_newer_of_two_replays_wins(live: Bench, drive: Path, tmp_path: Path, wait: Any) -> None:
     other = tmp_path / "other.mcap"
     shutil.copy(drive, other)
     root: Any = live.load(f"""
@@ -229,9 +227,7 @@ def test_any_path_can_be_named(live: Bench, drive: Path, tmp_path: Path, wait: A
     assert live.session.url.endswith("100%25 odd%3F%23%2541 ü.mcap")
 
 
-def test_what_the_interface_publishes_goes_nowhere_and_says_so(
-    live: Bench, drive: Path, wait: Any
-) -> None:
+def test_publishing_during_replay_is_a_problem(live: Bench, drive: Path, wait: Any) -> None:
     live.session.url = f"replay:{drive}?paused=true"
     live.module = "Ros2 1.0"
     root: Any = live.load("""
@@ -253,7 +249,9 @@ def test_what_the_interface_publishes_goes_nowhere_and_says_so(
     wait(lambda: "is a recording, which answers no requests" in root.served())
 
 
-def test_to_the_robot_only_when_told(live: Bench, drive: Path, wait: Any) -> None:
+def test_recording_is_sent_to_the_robot_only_on_request(
+    live: Bench, drive: Path, wait: Any
+) -> None:
     got: list[str] = []
     other: list[str] = []
     live.robot.create_subscription("/chatter", STRING, lambda m: got.append(m.data))
@@ -293,7 +291,7 @@ def test_commands_do_not_go_on_after_an_outage(
 
 
 @pytest.mark.parametrize("more", ["", "; toRobot: true"])
-def test_problems_are_told(live: Bench, tmp_path: Path, wait: Any, more: str) -> None:
+def test_problems_are_reported(live: Bench, tmp_path: Path, wait: Any, more: str) -> None:
     root = panel(live, f'file: "{tmp_path / "no.mcap"}"{more}')
     wait(lambda: "no.mcap does not exist" in root.problem())
 

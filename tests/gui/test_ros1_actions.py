@@ -60,7 +60,7 @@ def test_a_goal(actionlib: Client, counter: Counter, wait: Any) -> None:
         True,
     ]
     assert actionlib.run("handle.terminalState.state === ActionTerminalStates.SUCCEEDED")
-    actionlib.run("handle.resend()")  # told in the log
+    actionlib.run("handle.resend()")  # is logged
 
 
 def test_names_within_a_namespace(live: Bench, counter: Counter, wait: Any) -> None:
@@ -131,7 +131,7 @@ def test_the_interface_shuts_down(
 def test_misuse_throws(actionlib: Client, counter: Counter, wait: Any) -> None:
     counter.offer()
     wait(lambda: actionlib.run("client.connected"))
-    for script, told in (
+    for script, message in (
         ("client.sendGoal({order: 'x'})", "order: expected"),
         ("client.sendGoal({order: 1}, 5)", "transition_cb is not a function"),
         ("client.sendGoal({order: 1}, null, 5)", "feedback_cb is not a function"),
@@ -144,4 +144,4 @@ def test_misuse_throws(actionlib: Client, counter: Counter, wait: Any) -> None:
         )
         assert text is not None, script
         assert text.startswith("Error:"), text
-        assert told in text, text
+        assert message in text, text

@@ -1,4 +1,4 @@
-"""What only Ros 1.0 has: its singleton, publishers, subscribers, packages, loggers."""
+"""Features of Ros 1.0 alone: its singleton, publishers, subscribers, packages, loggers."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def up(ros1: Bench, wait: Any) -> Bench:
 )
 def test_init(ros1: Bench, call: str, name: str) -> None:
     script = f"""
-        let told = []
-        Ros.initialized.connect(function () {{ told.push(Ros.isInitialized()) }})
+        let initialized = []
+        Ros.initialized.connect(function () {{ initialized.push(Ros.isInitialized()) }})
         {call}
-        return [Ros.getName(), Ros.getNamespace(), Ros.ok(), told]
+        return [Ros.getName(), Ros.getNamespace(), Ros.ok(), initialized]
     """
     assert ros1.run(script) == [f"/{name}", "/", True, [True]]
 
@@ -69,7 +69,7 @@ def test_wrong_init(ros1: Bench, call: str) -> None:
     assert ros1.run("return Ros.isInitialized()") is False
 
 
-def test_shutdown_is_told(up: Bench) -> None:
+def test_shutdown_is_notified(up: Bench) -> None:
     root: Any = up.load("QtObject { property int n: 0 }", "import QtQuick 2.15")
     up.run("return Ros.ok()")
     other: Any = up.load(
@@ -272,7 +272,7 @@ def test_the_environment(ros1: Bench, monkeypatch: Any) -> None:
     assert ros1.run(script) == ["Hector", ""]
 
 
-def test_types_are_told_as_ros1_writes_them(running: Any, wait: Any, caplog: Any) -> None:
+def test_types_have_ros1_names_in_messages(running: Any, wait: Any, caplog: Any) -> None:
     running.module = "Ros 1.0"
     root = running.load(
         """QtObject {
@@ -284,8 +284,8 @@ def test_types_are_told_as_ros1_writes_them(running: Any, wait: Any, caplog: Any
         }"""
     )
     wait(root.ready)
-    told = "nothing was published on /word: std_msgs/String: data: expected a string, got 5"
-    assert told in root.send()
+    message = "nothing was published on /word: std_msgs/String: data: expected a string, got 5"
+    assert message in root.send()
     wait(lambda: "/odd: " in caplog.text)
     assert "Did you mean std_msgs/String? " in caplog.text
     root.shout()

@@ -13,32 +13,32 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture
-def told(live: Bench) -> list[Any]:
-    """What the robot's lamp was told; it is on the robot as the service /lamp."""
+def received(live: Bench) -> list[Any]:
+    """The values that the robot's lamp received, as the service /lamp."""
     live.module = "Ros 1.0"
-    told = []
+    received = []
 
     def switch(request: Any) -> dict[str, Any]:
-        told.append(request.data)
+        received.append(request.data)
         return {"success": request.data, "message": "done"}
 
     live.robot.create_service_server("/lamp", "std_srvs/srv/SetBool", switch)
-    return told
+    return received
 
 
-def test_a_call_returns_the_response(live: Bench, told: list[Any]) -> None:
+def test_a_call_returns_the_response(live: Bench, received: list[Any]) -> None:
     answer = live.run('return Service.call("/lamp", "std_srvs/SetBool", {data: true})')
     assert answer == {"success": True, "message": "done"}
-    assert told == [True]
+    assert received == [True]
 
 
-def test_an_empty_response_is_true(live: Bench, told: list[Any]) -> None:
+def test_an_empty_response_is_true(live: Bench, received: list[Any]) -> None:
     live.robot.create_service_server("/reset", "std_srvs/srv/Empty", lambda request: None)
     assert live.run('return Service.call("/reset", "std_srvs/Empty", {})') is True
     assert live.run('return Service.call("/reset", "std_srvs/Empty")') is True
 
 
-def test_a_failure_is_false_and_logged(live: Bench, told: list[Any], caplog: Any) -> None:
+def test_a_failure_is_false_and_logged(live: Bench, received: list[Any], caplog: Any) -> None:
     def fail(request: Any) -> None:
         raise RuntimeError("no power")
 
@@ -49,7 +49,7 @@ def test_a_failure_is_false_and_logged(live: Bench, told: list[Any], caplog: Any
         assert "/lift" in caplog.text
 
 
-def test_a_wrong_field_throws_its_path(live: Bench, told: list[Any], caplog: Any) -> None:
+def test_a_wrong_field_throws_its_path(live: Bench, received: list[Any], caplog: Any) -> None:
     script = """
         Service.call("/lamp", "std_srvs/SetBool", {data: true})
         try { Service.call("/lamp", "std_srvs/SetBool", {data: "yes"}) }
@@ -57,12 +57,12 @@ def test_a_wrong_field_throws_its_path(live: Bench, told: list[Any], caplog: Any
         return "nothing"
     """
     assert "data" in live.run(script)
-    assert told == [True]
-    # Nothing was wrong with the first call, and the second one tells its caller.
+    assert received == [True]
+    # Nothing was wrong with the first call, and the second one throws.
     assert not [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")]
 
 
-def test_an_unknown_type_calls_back_with_false(live: Bench, told: list[Any], wait: Any) -> None:
+def test_an_unknown_type_calls_back_with_false(live: Bench, received: list[Any], wait: Any) -> None:
     root: Any = live.load("""
         QtObject {
             property var answer
@@ -74,7 +74,7 @@ def test_an_unknown_type_calls_back_with_false(live: Bench, told: list[Any], wai
     wait(lambda: root.property("answer") is False)
 
 
-def test_asynchronously(live: Bench, told: list[Any], wait: Any) -> None:
+def test_asynchronously(live: Bench, received: list[Any], wait: Any) -> None:
     root: Any = live.load("""
         QtObject {
             property var answer
@@ -85,11 +85,13 @@ def test_asynchronously(live: Bench, told: list[Any], wait: Any) -> None:
         }
     """)
     wait(lambda: root.property("answer") == "done")
-    assert told == [True]
+    assert received == [True]
 
 
 @pytest.mark.both_qt
-def test_the_interface_lives_while_a_call_waits(live: Bench, told: list[Any], wait: Any) -> None:
+def test_the_interface_lives_while_a_call_waits(
+    live: Bench, received: list[Any], wait: Any
+) -> None:
     """A timer runs, and the page that called is destroyed, while its handler waits."""
     go = threading.Event()
 
@@ -132,7 +134,7 @@ def test_the_interface_lives_while_a_call_waits(live: Bench, told: list[Any], wa
 
 @pytest.mark.both_qt
 def test_calls_that_wait_within_each_other_leave_the_stop_button_alive(
-    live: Bench, told: list[Any], wait: Any, caplog: Any
+    live: Bench, received: list[Any], wait: Any, caplog: Any
 ) -> None:
     """A robot that does not answer must not use up the stack, which everything needs."""
     go, heard = threading.Event(), []

@@ -130,7 +130,7 @@ def test_domain_goes_into_the_address(bench: Any, wait: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("url", "env", "told"),
+    ("url", "env", "expected"),
     [
         ("", {}, "dds://?domain=7"),
         ("", {"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, "dds://?domain=7"),
@@ -143,7 +143,7 @@ def test_domain_goes_into_the_address(bench: Any, wait: Any) -> None:
     ],
 )
 def test_the_environment_says_which_middleware_a_domain_is_of(
-    url: str, env: dict, told: str, bench: Any, wait: Any, monkeypatch: Any, caplog: Any
+    url: str, env: dict, expected: str, bench: Any, wait: Any, monkeypatch: Any, caplog: Any
 ) -> None:
     for name in ("ROSGLASS_URL", "RMW_IMPLEMENTATION", "ZENOH_SESSION_CONFIG_URI", "ROS_DISTRO",
                  "ROS_DOMAIN_ID", "CYCLONEDDS_URI", "ROS_MASTER_URI"):  # fmt: skip
@@ -153,8 +153,8 @@ def test_the_environment_says_which_middleware_a_domain_is_of(
     bench.session.url = url
     bench.run("Ros2.init('a', Ros2.createInitOptions().setDomainId(7))")
     wait(lambda: bench.session.node is not None)
-    assert bench.session.node.url == told
-    assert ("has no domains" in caplog.text) == ("domain" not in told)
+    assert bench.session.node.url == expected
+    assert ("has no domains" in caplog.text) == ("domain" not in expected)
 
 
 def test_a_package_that_is_missing_is_named_with_what_installs_it(
@@ -403,7 +403,7 @@ def test_folders_that_do_not_answer(bench: Any, monkeypatch: Any, caplog: Any) -
     asked.set()
 
 
-def test_a_graph_that_is_there_already_and_one_that_is_gone_are_told(bench: Any, wait: Any) -> None:
+def test_present_graph_and_lost_graph_are_notified(bench: Any, wait: Any) -> None:
     bench.robot.create_publisher("/chatter", "std_msgs/msg/String")
     root: Any = bench.load("""
         QtObject {

@@ -17,26 +17,26 @@ if TYPE_CHECKING:
 
     from conftest import Bench
 
-#: Of the worlds that `url` has, ROS 1 alone.
+#: ROS 1 alone, of the values of `url`.
 ros1 = pytest.mark.parametrize("url", ["ros1"], indirect=True)
 RECEIVER = """
 import json, sys, rospy
 from std_msgs.msg import Header
 rospy.init_node("receiver", disable_signals=True)
-def tell(message):
+def report(message):
     print(json.dumps(["got", message.frame_id]), flush=True)
-sub = rospy.Subscriber("/head", Header, tell)
+sub = rospy.Subscriber("/head", Header, report)
 print(json.dumps(["ready", ""]), flush=True)
 for line in sys.stdin:
     if line == "unsubscribe\\n":
         sub.unregister()
     elif line == "subscribe\\n":
-        sub = rospy.Subscriber("/head", Header, tell)
+        sub = rospy.Subscriber("/head", Header, report)
 """
 
 
 class Rospy:
-    """A program of rospy; tells what it gets as JSON, a line each."""
+    """A program of rospy that prints what it receives as JSON, a line each."""
 
     def __init__(self, program: str, url: str) -> None:
         port = urlsplit(url).port
@@ -49,13 +49,13 @@ class Rospy:
             stdout=subprocess.PIPE,
             text=True,
         )
-        self.told: list[Any] = []
+        self.output: list[Any] = []
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self) -> None:
         assert self.process.stdout is not None
         for line in self.process.stdout:
-            self.told.append(json.loads(line))
+            self.output.append(json.loads(line))
 
     def ask(self, what: str) -> None:
         assert self.process.stdin is not None
@@ -93,28 +93,28 @@ PUBLISHING = """
             return [sent.join(), pub.isAdvertised, thrown].join(" ")
         }
         function send(text) { return pub.publish({frame_id: text}) }
-        function told() { return log.join() }
+        function changes() { return log.join() }
         function count() { return pub.getNumSubscribers() }
     }
 """
 
 
 def received(robot: Rospy) -> list[str]:
-    return [text for what, text in robot.told if what == "got"]
+    return [text for what, text in robot.output if what == "got"]
 
 
 @ros1
 @pytest.mark.parametrize("size", [5, 0])
-def test_what_is_published_right_after_advertise_arrives(
+def test_messages_published_right_after_advertise_arrive(
     live: Bench, rospy: Any, wait: Any, size: int
 ) -> None:
     live.module = "Ros 1.0"
     robot = rospy(RECEIVER)
-    wait(lambda: ["ready", ""] in robot.told)
+    wait(lambda: ["ready", ""] in robot.output)
     root: Any = live.load(PUBLISHING)
-    told = root.begin(size, False)
-    assert told.startswith("true,true,true,true,true false Error: ")
-    assert "frame_id: expected a string, got 5" in told
+    error = root.begin(size, False)
+    assert error.startswith("true,true,true,true,true false Error: ")
+    assert "frame_id: expected a string, got 5" in error
     wait(lambda: len(received(robot)) >= 5)
     root.send("last")
     wait(lambda: "last" in received(robot))
@@ -128,7 +128,7 @@ MAKE = {
 
 
 @pytest.mark.parametrize("module", MAKE)
-def test_what_is_published_at_once_arrives_in_both_worlds(
+def test_messages_published_at_once_arrive_in_ros_1_and_2(
     live: Bench, wait: Any, module: str
 ) -> None:
     live.module = module
@@ -152,7 +152,7 @@ def test_what_is_published_at_once_arrives_in_both_worlds(
     assert heard == ["n0", "n1", "n2"]
 
 
-def test_what_is_published_while_connecting_arrives(
+def test_messages_published_while_connecting_arrive(
     url: str, app: Any, tmp_path: Path, wait: Any
 ) -> None:
     import rosglass
@@ -188,7 +188,7 @@ def test_the_newest_are_held_where_the_queue_is_short(
 ) -> None:
     live.module = "Ros 1.0"
     robot = rospy(RECEIVER)
-    wait(lambda: ["ready", ""] in robot.told)
+    wait(lambda: ["ready", ""] in robot.output)
     root: Any = live.load(PUBLISHING)
     root.begin(2, False)
     wait(lambda: len(received(robot)) >= 2)
@@ -199,12 +199,12 @@ def test_the_newest_are_held_where_the_queue_is_short(
 
 
 @ros1
-def test_subscribers_that_come_and_go_are_told(live: Bench, rospy: Any, wait: Any) -> None:
+def test_subscribers_that_come_and_go_are_notified(live: Bench, rospy: Any, wait: Any) -> None:
     live.module = "Ros 1.0"
     root: Any = live.load(PUBLISHING)
     root.begin(5, False)
     robot = rospy(RECEIVER)
-    wait(lambda: root.told() == "connected")
+    wait(lambda: root.changes() == "connected")
     wait(lambda: root.count() == 1)
     # Also those that stay for less than a tenth of a second.
     for _ in range(5):
@@ -214,7 +214,7 @@ def test_subscribers_that_come_and_go_are_told(live: Bench, rospy: Any, wait: An
         wait(lambda: root.count() == 1)
     robot.close()
     # Also those that a busy node's looks have not found.
-    wait(lambda: root.told() == ",".join(6 * ["connected,disconnected"]))
+    wait(lambda: root.changes() == ",".join(6 * ["connected,disconnected"]))
 
 
 def test_namespaces_and_queues_without_limit_are_read_back(live: Bench, wait: Any) -> None:
@@ -388,12 +388,12 @@ def test_a_second_node_of_the_name_leaves_the_screen(
         wait(lambda: live.session.state == "failed")
         wait(lambda: root.property("n") == 1)
     live.session.shutdown()
-    assert root.property("n") == 1, "it is told once"
+    assert root.property("n") == 1, "notified once"
     assert not killed
 
 
 @pytest.mark.parametrize("module", ["Ros 1.0", "Ros2 1.0"])
-def test_a_type_of_the_robots_workspace_is_told_with_package_and_command(
+def test_type_of_the_robots_workspace_is_reported_with_package_and_command(
     live: Bench, wait: Any, module: str
 ) -> None:
     live.module = module
@@ -410,6 +410,8 @@ def test_a_type_of_the_robots_workspace_is_told_with_package_and_command(
     """)
     wait(root.problem)
     find = "rospack find" if live.robot.wire == "ros1" else "ros2 pkg prefix --share"
-    told = f"copy the folder of its package {package} from the robot ({find} {package} says where"
-    assert told in root.problem()
+    message = (
+        f"copy the folder of its package {package} from the robot ({find} {package} says where"
+    )
+    assert message in root.problem()
     assert f"add it: --definitions {package} on the command line" in root.problem()

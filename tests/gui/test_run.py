@@ -161,7 +161,7 @@ def test_offscreen_without_any_display(start: Any, file: Path, tmp_path: Path) -
         assert program.end() == 0, program.text
         assert target.exists()
     else:
-        # Qt 5 has no pictures there, and would crash where it looks for OpenGL.
+        # Qt 5 draws nothing there, and would crash when it looks for OpenGL.
         assert program.end() == 1
         assert "use a virtual screen: xvfb-run" in program.text
 
@@ -194,8 +194,8 @@ def test_a_screenshot_that_was_not_taken_is_missed(
         program.until("up")
         program.kill(signal.SIGTERM)
     assert program.end() == {"Qt.quit()": 1, "Qt.exit(7)": 7, "nothing": 143}[ending]
-    told = f"{target} was not written: the program was ended before 600 s were over (--after)"
-    assert (told in program.text) == (ending == "Qt.quit()")
+    message = f"{target} was not written: the program was ended before 600 s were over (--after)"
+    assert (message in program.text) == (ending == "Qt.quit()")
     assert not target.exists()
 
 
@@ -251,7 +251,7 @@ def test_other_files_than_qml_are_refused(start: Any, tmp_path: Path) -> None:
 @pytest.mark.both_qt
 @pytest.mark.parametrize("number", [1, 2])
 def test_closing_windows_ends_it(start: Any, file: Path, number: int) -> None:
-    """Of windows of equal rank the last one; what a window has opened itself does not count."""
+    """The last of windows of equal rank counts; those that a window has opened do not."""
     file.write_text(
         """import QtQuick 2.15
         import QtQuick.Window 2.15
@@ -307,7 +307,7 @@ def test_without_watch_nothing_is_reloaded(start: Any, file: Path) -> None:
     assert "201" not in program.text
 
 
-def test_an_address_that_nobody_listens_on_is_shown(start: Any, file: Path) -> None:
+def test_address_without_a_listener_is_shown(start: Any, file: Path) -> None:
     file.write_text(
         """import QtQuick 2.15
         import Ros2 1.0

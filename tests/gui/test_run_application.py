@@ -286,11 +286,11 @@ def test_a_warning_of_every_message_is_logged_with_its_cause_and_counted(
     text = FED.replace("BEFORE", before).replace("FILE", str(file))
     program = python(text.replace("DOMAIN", str(ros_domains[0])))
     assert program.end(120) == 0, program.text
-    told = [line for line in program.lines if "TypeError" in line]
-    assert len(told) == 2, program.text
-    assert told[0].startswith(place.format(file=file))
-    assert "geometry_msgs/msg/Pose has no field 'positon'; did you mean position?" in told[0]
-    assert "(9 more times)" in told[1]
+    logged = [line for line in program.lines if "TypeError" in line]
+    assert len(logged) == 2, program.text
+    assert logged[0].startswith(place.format(file=file))
+    assert "geometry_msgs/msg/Pose has no field 'positon'; did you mean position?" in logged[0]
+    assert "(9 more times)" in logged[1]
     assert "qml: from JavaScript" in program.lines
 
 
@@ -303,7 +303,7 @@ def test_a_message_handler_of_the_program_gets_what_the_engine_warns_of(
     text = FED.replace("BEFORE", own).replace("FILE", str(file))
     program = python(text.replace("DOMAIN", str(ros_domains[0])))
     assert program.end(120) == 0, program.text
-    told = [line for line in program.lines if "TypeError" in line]
-    assert len(told) > 10, program.text
-    assert all(line.startswith("own") for line in told)
+    logged = [line for line in program.lines if "TypeError" in line]
+    assert len(logged) > 10, program.text
+    assert all(line.startswith("own") for line in logged)
     assert "own from JavaScript" in program.lines

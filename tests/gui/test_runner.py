@@ -257,7 +257,7 @@ def test_several_windows(runner: Runner, file: Path, wait: Any, caplog: Any) -> 
     old["second"].setGeometry(150, 160, 333, 222)
     wait.settled(runner.session)
     node = runner.session.node
-    # With errors all windows stay, and all tell.
+    # With errors all windows stay, and all show them.
     file.write_text(WINDOWS.replace("height: 100", "heigth: 100"))
     assert not runner.reload()
     wait.settled(runner.session)
@@ -400,7 +400,9 @@ def test_import_paths_and_packages(
         ("{0}/data.bin", "not a QML file"),
     ],
 )
-def test_files_that_are_none(file: Path, world: LocalWorld, place: str, message: str) -> None:
+def test_invalid_files_are_rejected(
+    file: Path, world: LocalWorld, place: str, message: str
+) -> None:
     (file.parent / "empty").mkdir()
     (file.parent / "data.bin").write_bytes(b"\0\1")
     session = Session(connect=world.connect)
@@ -516,7 +518,7 @@ def test_connecting_waits_for_the_first_frame(
     session.close()
 
 
-def test_connecting_does_not_wait_for_a_window_that_nobody_sees(
+def test_connecting_does_not_wait_for_a_hidden_window(
     app: Any, file: Path, world: LocalWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rosglass.qml.engine.session._MAX_DEFER_MS", 60_000)

@@ -191,7 +191,7 @@ def test_a_server(live: Bench, wait: Any, handler: str, message: str) -> None:
 def test_failing_handlers_are_answered_at_once(
     live: Bench, wait: Any, answer: str, reason: str, caplog: Any
 ) -> None:
-    """They are logged; clients are told where the wire can, or receive a default response."""
+    """They are logged; clients get the error if the wire can carry it, or a default response."""
     kind = "type" if answer.startswith("processRequest") else "serviceType"
     root: Any = live.load(f"""
         QtObject {{

@@ -193,7 +193,7 @@ def test_last_message_of_a_lost_publisher_is_stale(running: Any, chat: Any, wait
     wait(lambda: root.property("shown") == "next" and not sub.property("stale"))
 
 
-def test_what_a_full_queue_drops_is_counted(running: Any, chat: Any, wait: Any) -> None:
+def test_messages_dropped_by_a_full_queue_are_counted(running: Any, chat: Any, wait: Any) -> None:
     root = load(running, 'topic: "/chat"; throttleRate: 0; queueSize: 2')
     sub = root.property("sub")
     wait(lambda: sub.property("subscribed") and chat.subscription_count())
@@ -444,7 +444,7 @@ def test_malformed_messages_are_refused_and_the_good_one_stays(
         ('topic: "/chat"; messageType: "no_pkg/msg/Nothing"', "no_pkg/msg/Nothing"),
     ],
 )
-def test_what_cannot_be_subscribed_is_said(
+def test_unusable_topic_is_a_problem(
     running: Any, chat: Any, wait: Any, properties: str, reason: str
 ) -> None:
     running.world.missing.add("no_pkg/msg/Nothing")
@@ -506,7 +506,7 @@ def test_every_property_reads_back(running: Any) -> None:
     ]
 
 
-def test_what_a_silent_link_kept_back_is_shown_but_not_as_live(
+def test_messages_held_back_by_a_silent_link_are_shown_as_stale(
     running: Any, chat: Any, wait: Any
 ) -> None:
     root = load(running, 'topic: "/chat"; messageType: "std_msgs/msg/String"; throttleRate: 0')
@@ -534,7 +534,7 @@ def test_it_is_subscribed_once_the_type_is_known(running: Any, wait: Any) -> Non
     wait(lambda: sub.property("subscribed"))
 
 
-def test_what_nobody_can_decode_is_not_shown(running: Any, wait: Any, caplog: Any) -> None:
+def test_undecodable_message_is_not_shown(running: Any, wait: Any, caplog: Any) -> None:
     root = load(running)
     sub = root.property("sub")
     robot = running.robot.create_publisher("/chat", OpaqueType("p/msg/Secret"))
@@ -583,7 +583,7 @@ def test_a_successor_that_has_said_nothing_is_not_trusted(live: Any, wait: Any) 
     robot.close()
 
 
-def test_a_topic_that_nobody_publishes_is_told(
+def test_topic_without_publisher_is_logged(
     running: Any, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr("rosglass.qml.elements.element.NO_PEER_MS", 20)
@@ -592,12 +592,12 @@ def test_a_topic_that_nobody_publishes_is_told(
     published = running.load('Subscription { topic: "/odom" }')
     wait(lambda: published.property("subscribed"))
     running.load('Subscription { topic: "/odomm" }')
-    # It would have been told of the other one before.
+    # The other one would have been logged before.
     wait(lambda: "/odomm: this topic has no publisher; did you mean /odom?" in caplog.text)
     assert caplog.text.count("this topic has no publisher") == 1
 
 
-def test_a_name_that_is_none_is_told_with_its_file(running: Any, wait: Any, caplog: Any) -> None:
+def test_invalid_name_is_logged_with_its_file(running: Any, wait: Any, caplog: Any) -> None:
     root = running.load('Subscription { topic: "no good" }')
     wait(lambda: root.property("problem"))
     (record,) = [one for one in caplog.records if "no good" in one.getMessage()]
@@ -606,7 +606,9 @@ def test_a_name_that_is_none_is_told_with_its_file(running: Any, wait: Any, capl
 
 
 @pytest.mark.both_qt
-def test_what_a_function_made_is_told_with_its_line(running: Any, wait: Any, caplog: Any) -> None:
+def test_problem_of_an_object_made_in_a_function_is_logged_with_its_line(
+    running: Any, wait: Any, caplog: Any
+) -> None:
     root = running.load("""QtObject {
         property var sub
         function go() {
@@ -654,12 +656,12 @@ def test_two_robots_of_one_name_are_a_problem(live: Any, wait: Any, caplog: Any)
     text = "{}: 2 publishers of nodes called /robot, a name of 2 nodes, are mixed".format
     twins, eyes, tf = text("/twins"), text("/eyes"), text("/tf")
 
-    def is_told() -> bool:
+    def is_reported() -> bool:
         publishers[0].publish({"data": 1})
-        told = [twins, eyes, twins, tf, tf, tf, tf]
-        return bool(root.property("received")) and root.problems() == "|".join(told)
+        expected = [twins, eyes, twins, tf, tf, tf, tf]
+        return bool(root.property("received")) and root.problems() == "|".join(expected)
 
-    wait(is_told)
+    wait(is_reported)
     assert "2 nodes are called /robot" in caplog.text
     twin.close()
     wait(lambda: root.problems() == "||||||")

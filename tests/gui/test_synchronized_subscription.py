@@ -57,7 +57,7 @@ class Robot:
 
 
 @pytest.mark.parametrize("module", ["Ros2 1.0", "Ros 1.0"])
-def test_what_belongs_together_comes_together(live: Bench, module: str, wait: Any) -> None:
+def test_matching_messages_arrive_together(live: Bench, module: str, wait: Any) -> None:
     live.module = module
     robot = Robot(live, wait)
     root = panel(live, 'topics: ["/a", "/b"]; slop: 20')
@@ -103,7 +103,7 @@ def test_the_topics_of_subscriptions(live: Bench, wait: Any) -> None:
     times = itertools.count()
 
     def heard(other: int, wanted: str) -> bool:
-        # In ROS 1, who subscribes twice has one link: nobody can tell when both are ready.
+        # In ROS 1, two subscriptions share one link: it does not show when both are ready.
         at = 10 * next(times)
         robot.send(0, at, "a")
         robot.send(other, at, "bc"[other - 1])
@@ -115,7 +115,7 @@ def test_the_topics_of_subscriptions(live: Bench, wait: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("properties", "told"),
+    ("properties", "message"),
     [
         ('topics: ["/a"]', "at least two of them"),
         ('topics: "/a"', "expected an array"),
@@ -124,9 +124,9 @@ def test_the_topics_of_subscriptions(live: Bench, wait: Any) -> None:
         ('topics: ["/a", {topic: "/b", type: "no/msg/Such"}]', "no/msg/Such"),
     ],
 )
-def test_problems_are_told(live: Bench, wait: Any, properties: str, told: str) -> None:
+def test_problems_are_reported(live: Bench, wait: Any, properties: str, message: str) -> None:
     root = panel(live, properties)
-    wait(lambda: told in root.problem())
+    wait(lambda: message in root.problem())
     root.setTopics(["/a", "/b"])
     wait(lambda: root.problem() == "")
 
@@ -156,8 +156,8 @@ def test_messages_without_header(live: Bench, wait: Any) -> None:
 
 def test_values_that_are_refused(live: Bench, caplog: Any) -> None:
     panel(live, "queueSize: 0; slop: -1; timeout: -5")
-    for told in ("queueSize 0 is not", "slop -1 ms is not", "timeout -5 ms is negative"):
-        assert told in caplog.text
+    for message in ("queueSize 0 is not", "slop -1 ms is not", "timeout -5 ms is negative"):
+        assert message in caplog.text
 
 
 def test_a_set_that_a_silent_link_kept_back_is_stale(running: Bench, wait: Any) -> None:

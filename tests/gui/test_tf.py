@@ -30,7 +30,7 @@ FOLLOWING = """
         function shown() {
             return [tf.valid, tf.stale, tf.rate, tf.enabled, tf.active, tf.message.exception].join()
         }
-        function told() { return order.join() }
+        function changes() { return order.join() }
     }
 """
 
@@ -78,8 +78,8 @@ def test_following(live: Bench, robot: Robot, module: str, wait: Any) -> None:
     assert root.shown() == "false,true,62.5,true,true,Uninitialized"
     assert root.w() == 1
     wait(lambda: root.shown().startswith("true,false"))
-    # Who asks when told that it is valid must not see the old message.
-    assert root.told().startswith("message true,valid true") or "valid true" in root.told()
+    # A handler that is notified of a valid transform must not see the old message.
+    assert root.changes().startswith("message true,valid true") or "valid true" in root.changes()
     before = root.x()
     assert before > 1
     wait(lambda: root.x() > before)
@@ -146,7 +146,7 @@ def test_a_transform_that_was_held_back_is_stale_as_it_arrives(live: Bench, wait
     wait(lambda: is_live(4.0))
 
 
-def test_what_a_dead_robot_left_behind_is_stale(live: Bench, robot: Robot, wait: Any) -> None:
+def test_transforms_of_a_dead_robot_are_stale(live: Bench, robot: Robot, wait: Any) -> None:
     first: Any = live.load(FOLLOWING)
     wait(lambda: first.shown().startswith("true,false"))
     robot.close()
@@ -167,7 +167,9 @@ def test_what_a_dead_robot_left_behind_is_stale(live: Bench, robot: Robot, wait:
     assert page.seenLive() == 0
 
 
-def test_what_still_comes_without_the_master_is_live(live: Bench, robot: Robot, wait: Any) -> None:
+def test_transforms_received_without_the_master_are_live(
+    live: Bench, robot: Robot, wait: Any
+) -> None:
     root: Any = live.load(FOLLOWING)
     wait(lambda: root.shown().startswith("true,false"))
     live.session._set_status(Status(ConnectionState.LOST, "no master"))
@@ -292,7 +294,7 @@ def test_lookups(live: Bench, robot: Robot, wait: Any) -> None:
     assert 0 < full["transform"]["translation"]["x"] < 0.2
 
 
-def test_the_reason_that_holds_now_is_told(live: Bench, wait: Any) -> None:
+def test_current_reason_is_shown(live: Bench, wait: Any) -> None:
     root: Any = live.load("""
         QtObject {
             property TfTransform tf: TfTransform { sourceFrame: "bace"; targetFrame: "map" }
@@ -404,7 +406,7 @@ def test_namespaces_are_apart(live: Bench, robot: Robot, wait: Any) -> None:
     wait(lambda: root.exception() == "Uninitialized")
 
 
-def test_changes_are_told(live: Bench, robot: Robot, wait: Any) -> None:
+def test_changes_are_notified(live: Bench, robot: Robot, wait: Any) -> None:
     root: Any = live.load("""
         QtObject {
             property int transforms: 0
@@ -443,7 +445,7 @@ def test_broadcasting(live: Bench, static: str, wait: Any) -> None:
     listener.close()
 
 
-def test_misuse_is_told(live: Bench, caplog: Any) -> None:
+def test_misuse_is_reported(live: Bench, caplog: Any) -> None:
     for script in (
         "TfTransformListener.canTransform(1, 2)",
         'TfTransformListener.lookUpTransform("a", "b", "noon")',

@@ -202,7 +202,7 @@ def test_times_can_be_made(bench: Any, script: str, expected: Any) -> None:
 @pytest.mark.parametrize(
     "arguments", ["'x'", "NaN", "1.5, 2", "{}", "null", "[1]", "Ros2.duration(1)", "undefined"]
 )
-def test_what_makes_no_time_throws(bench: Any, arguments: str) -> None:
+def test_invalid_arguments_throw(bench: Any, arguments: str) -> None:
     assert caught(bench, f"Ros2.time({arguments})").startswith("Error: Ros2.time: ")
 
 
@@ -267,7 +267,7 @@ def test_arrays_of_times_and_durations(bench: Any, module: int) -> None:
 
 
 @pytest.mark.parametrize("script", ["new Date(NaN)", "Infinity", "'now'", "[1, 2]", "{hour: 1}"])
-def test_what_is_no_time_is_named(bench: Any, script: str) -> None:
+def test_invalid_time_is_named(bench: Any, script: str) -> None:
     with pytest.raises(ConversionError) as error:
         convert(bench, HEADER, f"{{stamp: {script}}}")
     assert error.value.path.startswith("stamp")

@@ -36,7 +36,7 @@ NUMBERS = {
     ("Ros2", "Ros2ClockTypes"): "Uninitialized Ros System Steady",
 }
 
-#: What the interface has before each expression, by module; `robot` publishes the rest.
+#: Objects that expressions refer to, by module; `robot` publishes the rest.
 SCENES = {
     "Ros": """
         property var pub: Ros.advertise("std_msgs/String", "out", 7)
@@ -87,7 +87,7 @@ IMAGE = {
     "defaultTransport": ("image.defaultTransport", "compressed"),
     "enabled": ("image.enabled", True),
     "timeout": ("image.timeout", 3000),
-    # Without a picture.
+    # Without an image.
     "framerate": ("image.framerate", 0),
     "latency": ("image.latency", -1),
     "networkLatency": ("image.networkLatency", -1),
@@ -221,7 +221,7 @@ SAME: dict[tuple[str, str], dict[str, Any]] = {
     ("Ros", "TfTransform"): {**TF, "active": ("[tf.active, off.active]", [True, False])},
     ("Ros", "TfTransformListener"): {
         **{k: v for k, v in frames("TfTransformListener").items() if "Transform" in k},
-        "transformChanged": "test_tf.py::test_changes_are_told",
+        "transformChanged": "test_tf.py::test_changes_are_notified",
     },
     ("Ros", "Time"): {
         "now": ("Time.now().toSec() > 1e9", True),
@@ -452,7 +452,7 @@ def test_enumerators_have_the_numbers_of_ros(bench: Any, module: str, type: str)
     assert found == list(names.values())
 
 
-# PySide2 cannot tell what a type inherits.
+# PySide2 does not show a type's base.
 @pytest.mark.skipif(find_spec("PySide6") is None, reason="the page is made with Qt 6")
 def test_all_that_the_page_calls_same_is_here(app: Any) -> None:
     sys.path.insert(0, str(HERE.parents[1] / "scripts"))

@@ -46,7 +46,7 @@ def test_types_and_times(bench: Any, script: str, expected: Any) -> None:
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_what_json_cannot_say_arrives(bench: Any, value: float) -> None:
+def test_non_finite_numbers_arrive(bench: Any, value: float) -> None:
     shown = show(
         bench,
         "sensor_msgs/msg/BatteryState",
@@ -256,7 +256,7 @@ def test_received_messages_can_be_sent_back(bench: Any, count: int) -> None:
         ("std_msgs/msg/Header", "{stamp: NaN}", "", "milliseconds"),
     ],
 )
-def test_what_does_not_fit_is_named(
+def test_invalid_value_is_named(
     bench: Any, type_name: str, script: str, path: str, reason: str
 ) -> None:
     with pytest.raises(rosglass.Error) as caught:

@@ -1,4 +1,4 @@
-"""Pictures reach the pixels of a VideoOutput, on a virtual screen, drawn by each renderer."""
+"""Frames reach the pixels of a VideoOutput, on a virtual screen, drawn by each renderer."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def test_the_rotation_of_the_camera_is_that_of_every_qt(tmp_path: Path, screen: 
 @pytest.mark.both_qt
 def test_a_stream_shown_in_both_ways_at_once(tmp_path: Path, screen: str) -> None:
     seen = show(interface(tmp_path, "both"), screen, ["rgb8", "yuv422", "mono8"])
-    # Each half shows the whole picture: left column of each is its middle.
+    # Each half shows the whole image: left column of each is its middle.
     for encoding in ("rgb8", "yuv422", "mono8"):
         left, right, below_left, below_right = seen[encoding]
         np.testing.assert_allclose(left, right, atol=12)

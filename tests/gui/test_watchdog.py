@@ -1,4 +1,4 @@
-"""JavaScript without an end is ended, and told; what only takes long is not."""
+"""JavaScript without an end is ended and reported; slow code is not."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ LINE = 5
 
 
 class Helper(QtCore.QObject):
-    """What an application gives its QML."""
+    """The object that an application gives its QML."""
 
-    told = Signal()
+    changed = Signal()
 
     def __init__(self, session: Session) -> None:
         super().__init__()
         self._session = session
 
-    one = Property(int, lambda _: 1, notify=told)
+    one = Property(int, lambda _: 1, notify=changed)
 
     @Slot(float)
     def rest(self, seconds: float) -> None:
@@ -66,8 +66,8 @@ class Helper(QtCore.QObject):
         wait_for(self._session, lambda ended: QtCore.QTimer.singleShot(milliseconds, ended))
 
     @Slot()
-    def tell(self) -> None:
-        self.told.emit()
+    def notify(self) -> None:
+        self.changed.emit()
 
 
 def root_of(runner: Runner) -> Any:
@@ -127,7 +127,7 @@ def panel(runner: Runner) -> str:
         "try { while (true) {} } catch (error) { done = ['caught'] }",
     ],
 )
-def test_a_loop_without_end_is_ended_and_told_with_its_place(
+def test_endless_loop_is_ended_and_reported_with_its_position(
     run: Callable[..., Runner], wait: Callable[..., None], caplog: Any, code: str
 ) -> None:
     runner = run(code, 0.5)
@@ -149,14 +149,14 @@ def test_a_loop_without_end_is_ended_and_told_with_its_place(
 def test_a_handler_of_a_signal_from_python_is_ended_too(
     run: Callable[..., Runner], wait: Callable[..., None]
 ) -> None:
-    runner = run("helper.told.connect(function () { while (true) {} }); helper.tell()", 0.5)
+    runner = run("helper.changed.connect(function () { while (true) {} }); helper.notify()", 0.5)
     QtCore.QMetaObject.invokeMethod(runner.root, "begin")
     wait(lambda: panel(runner))
     assert f"{runner.file}:{LINE}" in panel(runner)
 
 
 @pytest.mark.parametrize("slot", ["rest", "compute"])
-def test_a_slow_function_in_python_is_told_and_what_called_it_goes_on(
+def test_slow_python_function_is_reported_and_its_caller_goes_on(
     run: Callable[..., Runner], wait: Callable[..., None], caplog: Any, slot: str
 ) -> None:
     # What Python computes for JavaScript counts as its own, so there it must stay below the limit.
@@ -275,7 +275,7 @@ def test_whatever_a_function_throws_is_an_error(run: Callable[..., Runner]) -> N
 
 
 @pytest.mark.parametrize("limit", [-1, float("nan"), float("inf"), True, "5", None])
-def test_limits_that_are_no_seconds_are_refused(app: Any, limit: Any) -> None:
+def test_invalid_limits_are_refused(app: Any, limit: Any) -> None:
     session = Session(connect=LocalWorld().connect)
     with pytest.raises(Error, match=r"Session\.longest_script: .* 0 for no limit"):
         session.longest_script = limit
@@ -319,7 +319,7 @@ def test_a_loop_without_end_while_the_file_is_loaded_is_ended(
     assert done(runner) == lived_on or "the machine is busy" in panel(runner)
 
 
-def test_a_file_whose_required_properties_nobody_sets_is_refused(
+def test_file_with_unset_required_properties_is_refused(
     run: Callable[..., Runner],
 ) -> None:
     runner = run("", 0.5)
@@ -330,7 +330,7 @@ def test_a_file_whose_required_properties_nobody_sets_is_refused(
     assert root_of(runner) is before
 
 
-def test_that_more_may_have_ended_is_told(
+def test_uncertain_interruption_is_reported(
     run: Callable[..., Runner], wait: Callable[..., None], monkeypatch: Any
 ) -> None:
     # As if this thread had been kept from its processor.

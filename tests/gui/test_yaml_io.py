@@ -130,7 +130,7 @@ def test_maps_and_sets_are_written(
         ("(() => { const m = new Map(); m.set('m', m); return m })()", "not referring to"),
     ],
 )
-def test_what_has_no_content_is_refused(
+def test_value_without_content_is_refused(
     bench: Any, tmp_path: Path, caplog: Any, value: str, reason: str
 ) -> None:
     assert write(bench, tmp_path / "a.yaml", value) is False
@@ -238,9 +238,7 @@ def test_other_places_are_refused(bench: Any, caplog: Any, path: str) -> None:
 @pytest.mark.parametrize(
     "value", ["function() {}", "{a: [() => 1]}", "(() => { const a = {}; a.a = a; return a })()"]
 )
-def test_what_cannot_be_written_leaves_the_file_alone(
-    bench: Any, tmp_path: Path, value: str
-) -> None:
+def test_unwritable_value_leaves_the_file_alone(bench: Any, tmp_path: Path, value: str) -> None:
     file = tmp_path / "a.yaml"
     file.write_text("before: 1\n")
     assert write(bench, file, value) is False

@@ -1,8 +1,8 @@
-"""Run by test_video_output.py on a virtual screen: shows pictures and prints what pixels became.
+"""Run by test_video_output.py on a virtual screen: shows images and prints what pixels became.
 
 Arguments: a QML file with an object called "camera", and names of encodings. Prints a JSON object
-per encoding: the colours in the middle of the picture's four quarters, each encoding's turned on by
-one from those of the encoding before; and the implicit size of the VideoOutput, with a picture and
+per encoding: the colours in the middle of the image's four quarters, each encoding's turned on by
+one from those of the encoding before; and the implicit size of the VideoOutput, with an image and
 after the signal was lost.
 """
 
@@ -113,25 +113,25 @@ def main() -> None:
         until(differ)
         return seen
 
-    def tell_size(when: str) -> None:
+    def print_size(when: str) -> None:
         for item in view.rootObject().childItems():
             if item.inherits("QQuickVideoOutput") or item.inherits("QDeclarativeVideoOutput"):
                 size = [round(item.implicitWidth()), round(item.implicitHeight())]
                 print(json.dumps({"encoding": when, "seen": size}), flush=True)
 
     until(lambda: sub.property("subscribed"))
-    sub.setProperty("timeout", 60_000)  # none is blank before it is looked at
+    sub.setProperty("timeout", 60_000)  # none is blank before it is compared
     seen = colours()
     for turn, encoding in enumerate(encodings):
         camera.publish(message(encoding, turn % 4))
         until(lambda encoding=encoding: sub.property("encoding") == encoding)
         seen = others_than(seen)
         print(json.dumps({"encoding": encoding, "seen": seen}), flush=True)
-    tell_size("size with a picture")
+    print_size("size with a picture")
     sub.setProperty("timeout", 100)
     until(lambda: sub.property("stale"))
     print(json.dumps({"encoding": "timeout", "seen": others_than(seen)}), flush=True)
-    tell_size("size without")
+    print_size("size without")
     view.close()
     session.close()
 
