@@ -66,8 +66,8 @@ def screen() -> str:
         stderr=subprocess.DEVNULL,
     )
     os.close(write)
-    with os.fdopen(read) as told:
-        return f":{told.readline().strip()}"
+    with os.fdopen(read) as numbers:
+        return f":{numbers.readline().strip()}"
 
 
 @pytest.fixture(scope="session")
@@ -149,7 +149,7 @@ def rviz_notices_changes(app: Application) -> Callable[[], bool]:
 
 @pytest.fixture
 def drawn(app: Application) -> Iterator[list[Any]]:
-    """What overlays took in each frame in which any was drawn."""
+    """The work of overlays in each frame in which any was drawn."""
     works: list[Any] = []
     app.overlays.drawn.connect(works.append)
     yield works
@@ -164,7 +164,7 @@ def frames(wait: QtWaiting) -> Callable[[int], None]:
 
 @pytest.fixture
 def grab(app: Application, frames: Callable[[int], None]) -> Callable[[], Any]:
-    """Return a picture of the 3D view after RViz has drawn two more frames; QImage."""
+    """Return an image of the 3D view after RViz has drawn two more frames; QImage."""
 
     def grab() -> Any:
         frames(3)
@@ -183,12 +183,12 @@ class Hand:
         self._held: dict[tuple[str, str], None] = {}
 
     def do(self, *words: object) -> None:
-        told = [str(word) for word in words]
-        for act, what in itertools.pairwise(told):
+        arguments = [str(word) for word in words]
+        for act, what in itertools.pairwise(arguments):
             if act in ("mousedown", "keydown"):
                 self._held[act.replace("down", "up"), what] = None
             self._held.pop((act, what), None)
-        subprocess.run(["xdotool", *told], check=True, capture_output=True)
+        subprocess.run(["xdotool", *arguments], check=True, capture_output=True)
         self.wait.frames(2)
 
     def let_go(self) -> None:
@@ -381,7 +381,7 @@ def file(tmp_path: Path) -> Path:
 def show_file(request: pytest.FixtureRequest, app: Any, file: Path) -> Callable[..., Any]:
     """Show QML text over the 3D view, after the test module's own imports; returns the overlay.
 
-    Errors tell the line, so the imports are each module's own.
+    Errors name the line, so the imports are each module's own.
     """
 
     def show_file(text: str, **options: Any) -> Any:
@@ -466,8 +466,8 @@ def seen(master: str, tmp_path: Path) -> Callable[..., dict[str, Any]]:
             )
         lines = [line for line in done.stdout.splitlines() if line.startswith("SEEN ")]
         assert lines, f"it ended with {done.returncode}: {done.stdout[-3000:]}"
-        told: dict[str, Any] = json.loads(lines[0].removeprefix("SEEN "))
-        return told
+        seen: dict[str, Any] = json.loads(lines[0].removeprefix("SEEN "))
+        return seen
 
     return run
 

@@ -22,7 +22,7 @@ SCRIPT = Path(__file__).parents[1] / "gui" / "fuzz.js"
 LIMIT = 20
 #: Values that are read of one, instead of 2^18 (which tests/gui reads): a second for each member.
 MOST_VALUES = 1 << 14
-#: What is driven, and its members that are left out: those that wait for the operator.
+#: Driven objects, and their members that are left out: those that wait for the operator.
 OBJECTS = {
     "tool": ("rviz.toolManager.tools[0]", []),
     "display": ("rviz.display('Grid') || rviz.addDisplay('rviz/Grid')", []),
@@ -35,7 +35,7 @@ OBJECTS = {
 
 
 class Host(QtCore.QObject):
-    """What the JavaScript side is given."""
+    """The object that the JavaScript side gets."""
 
     def __init__(self, last: str) -> None:
         super().__init__()
@@ -73,8 +73,8 @@ def main(last: str, folder: str) -> None:
     text = f'import QtQuick 2.15\nimport "{SCRIPT.as_uri()}" as Fuzz\n'
     text += """Item {
         function run(host, object, name, left) {
-            const told = Fuzz.members(object).filter(m => left.indexOf(m) < 0)
-            Fuzz.drive(host, object, null, [name, told, true])
+            const members = Fuzz.members(object).filter(m => left.indexOf(m) < 0)
+            Fuzz.drive(host, object, null, [name, members, true])
         }
     }"""
     file.write_text(text)

@@ -1,4 +1,4 @@
-"""What only OpenGL draws; test_rendering_opengl.py runs it, in an RViz of its own."""
+"""Rendering by OpenGL alone; test_rendering_opengl.py runs it, in an RViz of its own."""
 
 from __future__ import annotations
 

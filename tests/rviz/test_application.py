@@ -1,4 +1,4 @@
-"""RViz from Python: its config files, full screen, menus, and pictures of it."""
+"""RViz from Python: its config files, full screen, menus, and screenshots."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ CONTENT = 'import QtQuick 2.15\nItem { Rectangle { width: 50; height: 40; color:
 
 
 def test_config_files_are_saved_and_loaded(app: Any, tmp_path: Path) -> None:
-    told: list[Any] = []
-    app.window.config_loading.connect(lambda: told.append("loading"))
-    app.window.config_loaded.connect(told.append)
+    signals: list[Any] = []
+    app.window.config_loading.connect(lambda: signals.append("loading"))
+    app.window.config_loaded.connect(signals.append)
     app.fixed_frame = "odom"
     app.save_config(tmp_path / "a.rviz")
-    assert told == []
+    assert signals == []
     app.fixed_frame = "base"
     app.load_config(tmp_path / "a.rviz")
     assert app.fixed_frame == "odom"
-    assert told == ["loading", str(tmp_path / "a.rviz")]
+    assert signals == ["loading", str(tmp_path / "a.rviz")]
     assert app.window.config == str(tmp_path / "a.rviz")
     # Without a name, where it came from.
     app.fixed_frame = "arm"
@@ -55,14 +55,14 @@ def test_names_that_no_frame_has(app: Any, frame: str) -> None:
 
 
 def test_full_screen(app: Any, wait: Any) -> None:
-    told: list[bool] = []
-    app.window.fullscreen_changed.connect(told.append)
+    changes: list[bool] = []
+    app.window.fullscreen_changed.connect(changes.append)
     app.window.fullscreen = True
     wait(lambda: app.window.fullscreen)
     assert not app.window.widget.menuBar().isVisible()
     app.window.fullscreen = False
     wait(lambda: not app.window.fullscreen)
-    assert told == [True, False]
+    assert changes == [True, False]
 
 
 def whole_view(app: Any) -> bool:
@@ -87,7 +87,7 @@ def test_the_3d_view_alone(app: Any, wait: Any, hand: Any, tmp_path: Path) -> No
     window.fullscreen = False
     wait(lambda: not window.fullscreen)
     wait(lambda: whole_view(app))
-    # What is wrong with the master is told all the same.
+    # A problem with the master is shown all the same.
     window.bare.warn(True)
     wait(lambda: window.widget.statusBar().isVisible() and not whole_view(app))
     window.bare.warn(False)

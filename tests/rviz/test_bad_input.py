@@ -108,7 +108,7 @@ def test_errors_in_files_are_reported_with_place_and_advice(
     goes_on()
 
 
-def test_files_that_are_none(app: Any, tmp_path: Path, goes_on: Any) -> None:
+def test_invalid_files_are_rejected(app: Any, tmp_path: Path, goes_on: Any) -> None:
     from rosglass.errors import Error, QmlError
 
     with pytest.raises(QmlError, match=r"nowhere\.qml: there is no such file"):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
 PATIENCE = 30
-#: What the program may take to end, on a machine that does other things, too.
+#: Seconds that the program may take to end, on a busy machine, too.
 ENDING = 8.0
 OVERLAY = """
 import QtQuick 2.15
@@ -366,10 +366,10 @@ def test_ends_when_its_screen_or_window_is_lost(
         program.wait_for("up")
         eventually(lambda: nodes(master) >= {"/rviz_lost", "/its_overlay"}, timeout=PATIENCE)
         happens(screen)
-        # A crash would be told as a negative number.
+        # A crash would give a negative number.
         assert program.process.wait(PATIENCE) == 1, program.output
-        told = {message.format(display=screen.display) for message in messages}
-    assert any(message in program.output for message in told), program.output
+        expected = {message.format(display=screen.display) for message in messages}
+    assert any(message in program.output for message in expected), program.output
     assert not nodes(master) & {"/rviz_lost", "/its_overlay"}
 
 

@@ -19,7 +19,7 @@ FOLDER = Path(__file__).parents[2] / "examples/rviz"
 
 
 class Dashboard:
-    """What the operator sees and does, by names."""
+    """The texts that the operator sees, and actions, by names."""
 
     def __init__(self, root: Any) -> None:
         self.root = root
@@ -100,7 +100,7 @@ def test_all_elements_show_that_the_robot_is_silent(
     wait(lambda: "Highest speed   unknown" in dashboard.seen())
     wait(lambda: "Flashlight: unknown" in dashboard.seen())
     assert not dashboard.find("speed").isEnabled()
-    # What is asked for all the same says that nobody answers.
+    # A request that is made all the same shows that there is no answer.
     dashboard.click("flashlight")
     wait(lambda: any(text.startswith("Flashlight: NO ANSWER") for text in dashboard.seen()))
     if end is signal.SIGSTOP:
@@ -177,5 +177,5 @@ def test_requests_refused_by_the_robot_are_reported(
     wait(lambda: dashboard.find("mode safe").property("checked"))
     wait(lambda: dashboard.find("behaviour Look around").isEnabled())
     dashboard.click("behaviour Look around")
-    told = "Look around: failed: no behaviours in mode safe; choose another mode"
-    wait(lambda: told in dashboard.seen())
+    text = "Look around: failed: no behaviours in mode safe; choose another mode"
+    wait(lambda: text in dashboard.seen())

@@ -65,7 +65,7 @@ def test_dragging_an_entry_changes_which_is_above(
     wait.frames(2)
     assert order(app) == ["Red", "Blue"]
     panel.drag(("Red",), place(panel, "Blue"))
-    # It has been there before; two at once would be none.
+    # Wait for the panel: two moves at once would cancel each other.
     wait(lambda: [overlay.name for overlay in app.entries._panel_order] == ["Red", "Blue"])
     panel.drag(("Blue",), place(panel, "Red"))
     wait(lambda: order(app) == ["Blue", "Red"])
@@ -262,7 +262,7 @@ def test_saved_values_mark_rviz_as_modified(
         wait(lambda: app.window.modified)
         # Qt shows a star in its place.
         assert "[*]" in window.windowTitle()
-    # The same values anew are no change.
+    # Setting the same values again is not a change.
     wait.frames(3)
     app.save_config(file)
     overlay.properties.set_config({"tab": 3})

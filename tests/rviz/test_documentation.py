@@ -1,4 +1,4 @@
-"""What docs/rviz.md says of the object ``rviz``: every member is there, and every example runs."""
+"""The object ``rviz`` in docs/rviz.md: every member is there, and every example runs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 PAGE = (Path(__file__).parents[2] / "docs" / "rviz.md").read_text(encoding="utf-8")
 GUIDE = PAGE[PAGE.index("## The rviz object") : PAGE.index("## Input")]
 ROW = re.compile(r"^\| `(\w+)[^`]*` \| .+? \| `(.+)` \|$", re.MULTILINE)
-#: Of each table, by a member that only it has: the object, and its name in examples.
+#: The tables, by a member that only each has: the object, and its name in examples.
 OBJECTS = {
     "isFullscreen": "rviz",
     "registerIntProperty": "rviz",
@@ -49,8 +49,8 @@ def tables() -> dict[str, dict[str, str]]:
 TABLES = tables()
 BLOCKS = re.findall(r"```qml\n(.*?)```", PAGE, re.DOTALL)
 PROGRAMS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-#: What tells that several properties have changed, is Python's, or is for RosRviz's own QML.
-NOT_TOLD = {
+#: Members that notify of several properties' changes, are Python's, or are for RosRviz's own QML.
+NOT_LISTED = {
     "objectName",
     "changed",
     "moved",
@@ -101,10 +101,10 @@ def test_every_member_is_documented(object_name: str, run: Any, app: Any) -> Non
     text = f"(function () {{ {NAMES} let all = []; for (const m in {object_name}) all.push(m);"
     text += "return JSON.stringify(all) })()"
     there = set(json.loads(overlay.engine.evaluate(text).toString()))
-    there = {m for m in there if not m.startswith("_") and not m.endswith("Changed")} - NOT_TOLD
-    told = set(TABLES[object_name])
-    assert there - told == set()
-    assert told - there <= {"toolChanged"}
+    there = {m for m in there if not m.startswith("_") and not m.endswith("Changed")} - NOT_LISTED
+    listed = set(TABLES[object_name])
+    assert there - listed == set()
+    assert listed - there <= {"toolChanged"}
 
 
 @pytest.mark.parametrize("number", range(len(BLOCKS)))

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 FOLDER = Path(__file__).parents[2] / "examples/rviz"
 PATIENCE = 60.0
-#: What RViz may take to end beside others: after 1.7 s it ends in any case.
+#: Seconds that RViz may take to end beside other programs: after 1.7 s it ends in any case.
 ENDING = 10.0
-#: Where things are on a screen of 1280x800.
+#: Positions on a screen of 1280x800.
 STOP, BEHAVIOURS, FLIPPERS_UP = (90, 720), (1153, 560), (1153, 648)
 PICTURES = {"front camera": (432, 566, 256, 180), "rear camera": (747, 566, 256, 180)}
 GRAB = """
@@ -43,21 +43,21 @@ class Robot:
     )
 
     def __init__(self, node: Any) -> None:
-        self.told: dict[str, Any] = {}
+        self.messages: dict[str, Any] = {}
         for topic, kind in self.TOPICS:
             node.create_subscription(topic, kind, lambda m, topic=topic: self._hear(topic, m), 1)
 
     def _hear(self, topic: str, message: Any) -> None:
-        self.told[topic] = message
+        self.messages[topic] = message
 
     @property
     def stopped(self) -> bool | None:
-        message = self.told.get("/emergency_stop/state")
+        message = self.messages.get("/emergency_stop/state")
         return None if message is None else bool(message.data)
 
     @property
     def speed(self) -> float:
-        message = self.told.get("/odom")
+        message = self.messages.get("/odom")
         if message is None:
             return 0.0
         twist = message.twist.twist
@@ -65,7 +65,7 @@ class Robot:
 
     @property
     def flippers(self) -> list[float]:
-        message = self.told["/joint_states"]
+        message = self.messages["/joint_states"]
         named = zip(message.name, message.position, strict=True)
         return [angle for name, angle in named if "flipper" in name]
 
@@ -125,13 +125,13 @@ class Rviz:
         return QtGui.QImage(file)
 
     def evidence(self, robot: Robot) -> Callable[[], str]:
-        """Return the report of a failure: the robot's messages, and the path of the picture."""
+        """Return the report of a failure: the robot's messages, and the path of the screenshot."""
 
-        def tell() -> str:
+        def report() -> str:
             self.picture()
-            return f"{robot.told}; see {self._folder / 'picture.png'}; {self.output}"
+            return f"{robot.messages}; see {self._folder / 'picture.png'}; {self.output}"
 
-        return tell
+        return report
 
     def press(self, place: tuple[int, int]) -> None:
         self._do("mousemove", *place, "mousedown", 1)
@@ -191,7 +191,9 @@ def test_an_operator_sees_stops_and_commands_the_robot(robot: Robot, rviz: Rviz)
 
     eventually(look, lambda: f"live: {live}; {rviz.output}", timeout=PATIENCE)
     eventually(
-        lambda: robot.stopped is False and robot.speed > 0.1, lambda: robot.told, timeout=PATIENCE
+        lambda: robot.stopped is False and robot.speed > 0.1,
+        lambda: robot.messages,
+        timeout=PATIENCE,
     )
 
     rviz.click(STOP)
@@ -219,9 +221,9 @@ def test_an_operator_sees_stops_and_commands_the_robot(robot: Robot, rviz: Rviz)
     rviz.process.send_signal(signal.SIGINT)
     assert rviz.process.wait(PATIENCE) == 130, rviz.output
     assert time.monotonic() - started < ENDING, rviz.output
-    told = [
+    errors = [
         line
         for line in rviz.output.splitlines()
         if any(word in line for word in ("Error:", "Traceback"))
     ]
-    assert told == [], rviz.output
+    assert errors == [], rviz.output

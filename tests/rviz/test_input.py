@@ -1,4 +1,4 @@
-"""Who gets the mouse, the wheel and the keys: real ones, sent by the X server."""
+"""Delivery of the mouse, the wheel and keys: real ones, sent by the X server."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def test_every_error_names_the_thing_and_valid_values(tools: Any, displays: Any,
     qml().refuses(MISTAKES)
 
 
-def test_what_takes_anything_can_still_be_bound(app: Any, displays: Any, qml: Any) -> None:
+def test_properties_of_any_type_can_still_be_bound(app: Any, displays: Any, qml: Any) -> None:
     here = qml(
         """Item { id: root; property bool on: false; property string where: "odom"
         property bool shown: rviz.display("Grid").enabled

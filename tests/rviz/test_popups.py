@@ -77,13 +77,13 @@ def test_press_beside_dismisses(hand: Any, app: Any) -> None:
 
     popup = app.add(Popup(label(), "Light", light_dismiss=True))
     popup.move(200, 200)
-    told: list[int] = []
-    popup.dismissed.connect(lambda: told.append(1))
+    dismissals: list[int] = []
+    popup.dismissed.connect(lambda: dismissals.append(1))
     hand.wait.frames(3)
     hand.click(200, 200)
     assert popup.visible
     hand.click(400, 400)
-    assert (popup.visible, told) == (False, [1])
+    assert (popup.visible, dismissals) == (False, [1])
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_popup_follows_a_point(hand: Any, app: Any, view: Any) -> None:
     x, y, z = RvizCamera(app.window).eye
     popup.follow(app.rviz.trackers, (2 * x, 2 * y, 2 * z))
     assert not popup.content.isVisible()
-    # Nor where nobody knows its frame, which is told.
+    # Nor where its frame is unknown, which is a problem.
     popup.follow(app.rviz.trackers, (0, 0, 0), frame="nowhere")
     hand.wait(lambda: "the frame 'nowhere'" in popup.problem)
     assert not popup.content.isVisible()
@@ -144,8 +144,8 @@ def test_dialog_is_moved_by_its_title_and_reports_its_button(hand: Any, app: Any
 
     dialog = app.add(message("Title", "Really?", buttons=Button.YES | Button.NO))
     hand.wait.frames(3)
-    told: list[Any] = []
-    dialog.clicked.connect(told.append)
+    clicked: list[Any] = []
+    dialog.clicked.connect(clicked.append)
     box = dialog.content.geometry()
     hand.drag(box.center().x(), box.y() + 16, box.center().x() + 80, box.y() + 66)
     moved = dialog.content.geometry()
@@ -153,7 +153,7 @@ def test_dialog_is_moved_by_its_title_and_reports_its_button(hand: Any, app: Any
     assert abs(moved.y() - box.y() - 50) <= 2
     at = dialog.buttons[Button.NO].mapTo(dialog.root, dialog.buttons[Button.NO].rect().center())
     hand.click(at.x(), at.y())
-    assert told == [Button.NO]
+    assert clicked == [Button.NO]
     assert not dialog.visible
 
 
@@ -292,9 +292,9 @@ def test_popup_may_be_removed_by_its_own_button(hand: Any, app: Any, view: Any) 
     above = app.add(Popup(label("above"), "Above", modal=True))
     below.move(200, 200)
     above.move(240, 230)
-    told: list[str] = []
+    clicked: list[str] = []
     for popup in (below, above):
-        popup.content.clicked.connect(lambda *_, p=popup: (told.append(p.name), remove(p)))
+        popup.content.clicked.connect(lambda *_, p=popup: (clicked.append(p.name), remove(p)))
 
     def remove(popup: Any) -> None:
         app.overlays.remove(popup)
@@ -303,15 +303,15 @@ def test_popup_may_be_removed_by_its_own_button(hand: Any, app: Any, view: Any) 
     assert app.overlays.input.focused is above
     # The lower one is covered, and gets its turn when the upper one has gone.
     hand.click(170, 180)
-    assert told == []
+    assert clicked == []
     hand.click(240, 230)
-    assert told == ["Above"]
+    assert clicked == ["Above"]
     assert app.overlays.input.focused is below
     distance = view("Distance")
     hand.wheel(500, 400)
     assert view("Distance") == distance
     hand.click(240, 225)
-    assert told == ["Above", "Below"]
+    assert clicked == ["Above", "Below"]
     hand.wheel(500, 400)
     hand.wait(lambda: view("Distance") != distance)
 
@@ -391,8 +391,8 @@ def test_qml_popup_with_a_wrong_point_names_the_users_file(
     )
     hand.wait(lambda: "expected x, y and z in metres" in root.property("problem"))
     assert root.property("seen") == 0
-    told = [r for r in caplog.records if "expected x, y and z" in r.getMessage()]
-    assert len(told) == 1
-    assert "AnchoredPopup: " in told[0].getMessage()
+    errors = [r for r in caplog.records if "expected x, y and z" in r.getMessage()]
+    assert len(errors) == 1
+    assert "AnchoredPopup: " in errors[0].getMessage()
     assert "Test.qml" in caplog.text
     assert "AnchoredPopup.qml" not in caplog.text

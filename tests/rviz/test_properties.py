@@ -206,7 +206,7 @@ def test_a_colour_is_chosen_in_a_dialog(
     assert properties["Tint"].get().getRgb() == (1, 2, 3, 4)
 
 
-def test_what_is_read_only_or_hidden(shown: Any) -> None:
+def test_read_only_and_hidden_properties(shown: Any) -> None:
     from rosglass.rviz.host import pyqt
 
     properties, _, index = shown

@@ -157,7 +157,7 @@ def test_the_node_and_publishers_stay(show: Any, file: Path, app: Any, wait: Any
         wait(lambda: not session.holding)
         assert session.node is node
         wait(lambda: overlay.root.property("pub").property("isAdvertised"))
-    # Nobody else needs it.
+    # No other overlay needs it.
     app.overlays.remove(overlay)
     wait(lambda: session.node is None)
 
@@ -295,14 +295,14 @@ def test_watching_begins_and_ends_at_run_time(show: Any, file: Path, wait: Any) 
 
 PRESSED = """Item { property int clicks: 0; property int canceled: 0
     MouseArea { x: 40; y: 240; width: 100; height: 100
-        onClicked: parent.clicks++; onCanceled: told.append("canceled") }
+        onClicked: parent.clicks++; onCanceled: log.append("canceled") }
     TextField { x: 200; y: 240; width: 100; height: 40; objectName: "field" } }"""
 
 
 def test_a_press_ends_without_effect_and_keys_are_rvizs_again(
     show: Any, file: Path, app: Any, mouse: Any, wait: Any, grab: Any
 ) -> None:
-    overlay = show(PRESSED.replace('told.append("canceled")', "rviz.config = {canceled: true}"))
+    overlay = show(PRESSED.replace('log.append("canceled")', "rviz.config = {canceled: true}"))
     grab()
     assert mouse("press", 250, 260)
     mouse("release", 250, 260)

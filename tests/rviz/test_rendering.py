@@ -1,4 +1,4 @@
-"""What overlays look like over RViz's 3D view, and that drawing them stops when nothing changes."""
+"""The look of overlays over RViz's 3D view; drawing stops when nothing changes."""
 
 from __future__ import annotations
 
@@ -183,7 +183,7 @@ def test_panels_grow_and_shrink_with_their_content(
     ):
         for name, value in (("x", x), ("y", y), ("width", across), ("height", down)):
             item.setProperty(name, value)
-        # A screen under load shows pictures late.
+        # A screen under load shows frames late.
         wait(lambda at=(x, y, x + across, y + down): is_seen(*at))
         covered = app.overlays.covered * width * height
         assert across * down - 0.1 <= covered <= (across + 8) * (down + 8)
@@ -431,7 +431,7 @@ def test_overlays_that_come_and_go_leave_nothing_behind(
         cycle(number)
     gc.collect()
     assert textures() == used
-    # One picture of the view alone has 4 MB.
+    # One image of the view alone has 4 MB.
     assert memory() - before < 20_000_000
     steady.root.childItems()[1].setProperty("text", "QWERTZ")
     assert colour(grab(), 70, 70) == BLUE

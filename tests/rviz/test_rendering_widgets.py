@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Kept:
-    """Has an overlay keep the picture that it drew last."""
+    """Makes an overlay keep the image that it drew last."""
 
     def draw(self) -> Any:
         drawn = super().draw()  # type: ignore[misc]

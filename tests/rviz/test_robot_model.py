@@ -29,8 +29,10 @@ def test_its_description_and_frames_are_complete(app: Any, master: str, wait: An
 
         def drawn() -> bool:
             moving.publish(telemetry.moving_frames(RobotState(), Time.now()))
-            told = display.status.text.splitlines()
-            return {"URDF: URDF parsed OK", *(f"{link}: Transform OK" for link in links)} <= {*told}
+            lines = display.status.text.splitlines()
+            return {"URDF: URDF parsed OK", *(f"{link}: Transform OK" for link in links)} <= {
+                *lines
+            }
 
         try:
             wait(drawn)

@@ -1,4 +1,4 @@
-"""``make rviz-demo`` where there is no display: a picture, and nothing left behind."""
+"""``make rviz-demo`` without a display: a screenshot, and nothing left behind."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ sys.exit(main(float(sys.argv[1]), Path(sys.argv[2])))
 
 
 def children(pid: int) -> set[int]:
-    """Return the ids of all programs that one has started, and of those that they have."""
+    """Return the ids of all child processes of a program, and of theirs."""
     parents = {}
     for entry in Path("/proc").glob("[0-9]*"):
         # It may be gone by now.

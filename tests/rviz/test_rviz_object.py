@@ -14,23 +14,23 @@ import pytest
 
 def test_tools_that_the_user_selects_and_removes(app: Any, tools: Any, qml: Any, wait: Any) -> None:
     here = qml(
-        """Item { property var told: []
+        """Item { property var entries: []
         property Connections c: Connections { target: rviz.toolManager
             function onToolRemoved(tool) {
-                told.push("removed " + tool.classId + " " + tool.exists) }
-            function onToolChanged(tool) { told.push("changed " + tool.classId) }
-            function onToolsChanged() { told.push("tools " + rviz.toolManager.tools.length) } }
-        function log() { const t = told; told = []; return t } }"""
+                entries.push("removed " + tool.classId + " " + tool.exists) }
+            function onToolChanged(tool) { entries.push("changed " + tool.classId) }
+            function onToolsChanged() { entries.push("tools " + rviz.toolManager.tools.length) } }
+        function log() { const t = entries; entries = []; return t } }"""
     )
     run = here.run
     assert "viewpoint" in run("return rviz.toolManager.tools[1].description")
     run("rviz.toolManager.addTool('rviz/Measure'); root.log()")
     manager = app.window.manager.getToolManager()
     manager.setCurrentTool(manager.getTool(2))
-    wait(lambda: run("return root.told.length"))
+    wait(lambda: run("return root.entries.length"))
     assert run("return root.log()") == ["changed rviz/Select"]
     manager.removeTool(3)
-    wait(lambda: run("return root.told.length > 1"))
+    wait(lambda: run("return root.entries.length > 1"))
     assert run("return root.log()") == ["tools 3", "removed rviz/Measure false"]
     assert run("return rviz.toolManager.getTool('rviz/Measure')") is None
 

@@ -1,4 +1,4 @@
-"""Misspelled members of what QML over RViz is given are told, with place and nearest name."""
+"""Misspelled members of objects for QML over RViz are reported, with place and nearest name."""
 
 from __future__ import annotations
 

@@ -24,14 +24,14 @@ def tools(app: Any) -> Any:
 
 
 @pytest.fixture
-def told(tools: Any) -> list[str]:
-    told: list[str] = []
-    tools.added.connect(lambda tool: told.append(f"added {tool.name}"))
-    tools.removed.connect(lambda tool: told.append(f"removed {tool.name}"))
+def log(tools: Any) -> list[str]:
+    log: list[str] = []
+    tools.added.connect(lambda tool: log.append(f"added {tool.name}"))
+    tools.removed.connect(lambda tool: log.append(f"removed {tool.name}"))
     tools.selected.connect(
-        lambda: told.append(f"selected {tools.current.name if tools.current else None}")
+        lambda: log.append(f"selected {tools.current.name if tools.current else None}")
     )
-    return told
+    return log
 
 
 def dialog() -> Any:
@@ -55,15 +55,15 @@ def choose(class_name: str | None) -> None:
 
 @pytest.mark.parametrize("chosen", ["PublishPoint", None])
 def test_the_dialog_for_a_new_tool(
-    app: Any, tools: Any, told: list[str], show: Any, wait: Any, chosen: str | None
+    app: Any, tools: Any, log: list[str], show: Any, wait: Any, chosen: str | None
 ) -> None:
     from rosglass.qt import QtCore
 
     root = show(
-        """Item { property var told: []
+        """Item { property var added: []
         function ask() { return rviz.toolManager.addTool() === null }
         Connections { target: rviz.toolManager
-            function onToolAdded(tool) { told.push(tool.classId) } } }"""
+            function onToolAdded(tool) { added.push(tool.classId) } } }"""
     )
     tried: list[Any] = []
 
@@ -82,17 +82,17 @@ def test_the_dialog_for_a_new_tool(
     wait(lambda: tried)
     wait(lambda: dialog() is None)
     wait.frames(3)
-    added = root.property("told")
+    added = root.property("added")
     added = added.toVariant() if hasattr(added, "toVariant") else added
     if chosen is None:
-        assert (told, added, len(tools.all)) == ([], [], 3)
+        assert (log, added, len(tools.all)) == ([], [], 3)
     else:
-        assert told[0] == "added Publish Point"
+        assert log[0] == "added Publish Point"
         assert added == ["rviz/PublishPoint"]
         assert tools.all[-1].class_id == "rviz/PublishPoint"
 
 
-def test_tools_of_one_name(app: Any, tools: Any, told: list[str], wait: Any) -> None:
+def test_tools_of_one_name(app: Any, tools: Any, log: list[str], wait: Any) -> None:
     first = tools.find("rviz/Measure")
     second = tools.add("rviz/Measure")
     third = tools.add("rviz/Measure")
@@ -109,7 +109,7 @@ def test_tools_of_one_name(app: Any, tools: Any, told: list[str], wait: Any) -> 
     third.select()
     assert tools.current is third
     # The one that is gone was followed by the first tool.
-    assert told.count("selected Interact") == 1
+    assert log.count("selected Interact") == 1
 
 
 def tool_bar(app: Any) -> Any:
@@ -117,7 +117,7 @@ def tool_bar(app: Any) -> Any:
     return next(bar for bar in bars if bar.windowTitle() == "Tools")
 
 
-def test_the_tool_bar_removes_tools(app: Any, tools: Any, told: list[str], wait: Any) -> None:
+def test_the_tool_bar_removes_tools(app: Any, tools: Any, log: list[str], wait: Any) -> None:
     """By the menu behind its minus sign."""
     widgets = pyqt("QtWidgets")
     buttons = tool_bar(app).findChildren(widgets.QToolButton)
@@ -128,14 +128,14 @@ def test_the_tool_bar_removes_tools(app: Any, tools: Any, told: list[str], wait:
     measure = tools.find("rviz/Measure")
     measure.select()
     menu.triggered.emit(action)
-    wait(lambda: "removed Measure" in told)
+    wait(lambda: "removed Measure" in log)
     assert not measure.exists
-    wait(lambda: told[-1] == "selected Interact")
+    wait(lambda: log[-1] == "selected Interact")
     assert [tool.class_id for tool in tools.all] == ["rviz/Interact", "rviz/MoveCamera"]
 
 
 def test_keys_select_tools(
-    app: Any, tools: Any, told: list[str], hand: Any, wait: Any, show: Any
+    app: Any, tools: Any, log: list[str], hand: Any, wait: Any, show: Any
 ) -> None:
     root = show(
         """Item { property string now: rviz.toolManager.currentTool.shortcutKey

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-#: A plain RViz: loads a file, saves it as another one, and tells its displays.
+#: A plain RViz: loads a file, saves it as another one, and prints its displays.
 PLAIN = """
 import os, sys
 from python_qt_binding.QtWidgets import QApplication
@@ -228,9 +228,9 @@ def test_errors_of_settings_say_what_is_valid(settings: Any) -> None:
         "keys": (1, "Keyboard Navigation: expected true or false, got 1"),
         "namespace": ("a b", "Namespace: name 'a b': ' ' at position 1; only letters, digits"),
     }
-    for name, (value, told) in wrong.items():
+    for name, (value, message) in wrong.items():
         before = getattr(settings, name)
         with pytest.raises(Error) as error:
             setattr(settings, name, value)
-        assert told in str(error.value)
+        assert message in str(error.value)
         assert getattr(settings, name) == before

@@ -24,7 +24,7 @@ Item {
 def steps(
     app: Any, steered: Any, hand: Any, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[list[tuple[float, float]]]:
-    """What the keys shift the view by, ahead and to the left; a frame takes 0.1 s for them."""
+    """The shifts of the view by keys, ahead and to the left; a frame takes 0.1 s for them."""
     from rosglass.overlay import view_controller
 
     now, found = [0.0], []

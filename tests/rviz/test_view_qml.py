@@ -19,11 +19,11 @@ def run(
     """Run JavaScript in an overlay; returns what it returns, or the error that it throws."""
     file = tmp_path / "View.qml"
     file.write_text(
-        "import QtQuick 2.15\nItem { property var told: []\n"
+        "import QtQuick 2.15\nItem { property var log: []\n"
         "Connections { target: rviz.view\n"
-        "function onAnimationDurationChanged() { told.push(rviz.view.animationDuration) }\n"
-        "function onTrackingGainChanged() { told.push(rviz.view.trackingGain) }\n"
-        "function onMoved() { told.push('moved') } } }"
+        "function onAnimationDurationChanged() { log.push(rviz.view.animationDuration) }\n"
+        "function onTrackingGainChanged() { log.push(rviz.view.trackingGain) }\n"
+        "function onMoved() { log.push('moved') } } }"
     )
     overlay = app.add_qml(file)
     wait.frames(3)
@@ -49,12 +49,12 @@ def test_errors_list_the_known_frames(
     buffer = app.rviz.frames.buffer
     buffer.set_transform(Transform(frame_id="map", child_frame_id="rover"), static=True)
     assert run("rviz.view.track('rowver')").endswith("no frame 'rowver'; did you mean rover?")
-    # Tests before have left theirs, of which the first ones are told.
+    # Tests before have left theirs, of which the first ones are named.
     assert "no frame 'xyz'; there are " in run("rviz.view.track('xyz')")
     app.window.manager.setFixedFrame("world")
-    told = run("rviz.view.track('rover')")
-    assert "the fixed frame 'world'" in told
-    assert "does not exist; there are " in told
+    error = run("rviz.view.track('rover')")
+    assert "the fixed frame 'world'" in error
+    assert "does not exist; there are " in error
     app.window.manager.setFixedFrame("map")
     assert run("rviz.view.track('rover')") is None
     run("rviz.view.track('')")
@@ -64,14 +64,14 @@ def test_changes_by_the_operator_are_signalled(
     run: Any, app: Any, steered: Any, wait: Callable[..., None]
 ) -> None:
     wait.frames(2)
-    run("root.told = []")
+    run("root.log = []")
     app.view_entry.shown = True
     group = app.window.manager.getRootDisplayGroup()
     shown = [group.getDisplayAt(at) for at in range(group.numDisplays())]
     (entry,) = (display for display in shown if display.getName() == "View Controller")
     entry.subProp("Animation Duration").setValue(2.5)
     entry.subProp("Tracking Gain").setValue(5.0)
-    assert run("root.told") == [2.5, 5.0]
+    assert run("root.log") == [2.5, 5.0]
     run("rviz.view.animationDuration = 0.5")
     assert entry.subProp("Animation Duration").getValue() == 0.5
     app.view_entry.shown = False

@@ -242,10 +242,10 @@ def test_errors_of_slots_are_reported_at_any_time(
     assert other.problem == ""
     panel.clock.timer.stop()
 
-    def nobodys() -> None:
-        raise RuntimeError("of nobody")
+    def fail() -> None:
+        raise RuntimeError("without overlay")
 
-    QtCore.QTimer.singleShot(0, nobodys)
-    wait(lambda: "RuntimeError: of nobody" in caplog.text)
-    assert "test_widgets.py" in caplog.text.split("of nobody")[0].splitlines()[-1]
+    QtCore.QTimer.singleShot(0, fail)
+    wait(lambda: "RuntimeError: without overlay" in caplog.text)
+    assert "test_widgets.py" in caplog.text.split("without overlay")[0].splitlines()[-1]
     assert other.problem == ""

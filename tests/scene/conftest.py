@@ -112,7 +112,7 @@ class SceneBench:
 
         from rosglass.qml.elements.image_sinks import grab
 
-        # What has changed is drawn after a pause, in which the last picture would be grabbed.
+        # What has changed is drawn after a pause, in which the last frame would be grabbed.
         for view in (self.view, *self.view.findChildren(type(self.view))):
             view.update()
         image = grab(self.window).convertToFormat(QImage.Format.Format_RGB888)
@@ -120,7 +120,7 @@ class SceneBench:
         return rows[:, : image.width() * 3].reshape(image.height(), image.width(), 3).copy()
 
     def drawn(self) -> int:
-        """Return how many pictures were drawn."""
+        """Return how many frames were drawn."""
         return self.view.pictures_drawn()
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ import sys
 import dora
 import pyarrow as pa
 
-#: What dora does not see from Python's values.
+#: Types that dora cannot derive from Python's values.
 NUMBERS = {"sec": pa.int32(), "nanosec": pa.uint32(), "mode": pa.uint8()}
 
 

@@ -1,6 +1,6 @@
 """Draws each kind of drawable by the graphics interface of its process, for the test beside it.
 
-Its argument is a folder: pictures go to pictures.npz, and what picks found to found.json. Qt reads
+Its argument is a folder: images go to pictures.npz, and what picks found to found.json. Qt reads
 the graphics interface from QSG_RHI_BACKEND.
 """
 
@@ -22,7 +22,7 @@ from rosglass.scene.render.matrices import instance_matrix
 from rosglass.scene.render.mesh_shapes import BOX, SPHERE
 from rosglass.scene.render.scene_tree import Drawable, Group
 
-#: Where each drawable is picked: in none of the middles, so that a mirrored picture differs.
+#: Position at which each drawable is picked: off every axis, so that a mirrored image differs.
 PLACE = (1.0, -2.0, 0.5)
 #: Times that a view is made and destroyed.
 ROUNDS = 5
@@ -51,7 +51,7 @@ def by_channel(mode: str) -> Points:
 
 
 def drawables() -> dict[str, list[Drawable]]:
-    """Return what each picture shows; what is picked is the first one."""
+    """Return the drawables of each image; the first one is picked."""
     lines, strip = Lines(3.0), Lines(0.2, in_metres=True)
     x, y, z = PLACE
     lines.set_segments([[(-3, y, z), (3, y, z)], [(x, -3, 0), (x, 3, 2)]], [[1, 0, 0], [0, 1, 0]])

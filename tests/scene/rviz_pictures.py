@@ -1,8 +1,8 @@
-"""An RViz that takes pictures of its 3D view, for test_against_rviz.py; runs in .venv-system.
+"""An RViz that takes screenshots of its 3D view, for test_against_rviz.py; runs in .venv-system.
 
 Takes one JSON object per line and answers with a line once it is done: {"config": FILE, "panel":
 NAME} opens a config, of which the panel of a display is shown instead of the view if NAME is not
-empty; {"into": FILE} saves a picture. Its arguments are the width and height of the view.
+empty; {"into": FILE} saves a screenshot. Its arguments are the width and height of the view.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The 3D view against real RViz: the same config and the same messages give the same picture."""
+"""The 3D view against real RViz: the same config and the same messages give the same image."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ class Pair:
         self._order(config=str(self._config), panel=case.panel)
 
     def repeat(self, publish: Callable[[], None]) -> None:
-        """Publish again; wait for our picture of the panel, which fades otherwise."""
+        """Publish again; wait for our image of the panel, which fades otherwise."""
         before = 0 if self._panel is None else self._panel.received
         publish()
         self.wait(lambda: self._panel is None or self._panel.received > before)
@@ -163,7 +163,7 @@ class Pair:
         self._answer("DONE")
 
     def theirs(self) -> NDArray[np.uint8]:
-        """Return RViz's picture."""
+        """Return RViz's frame."""
         from PySide6.QtGui import QImage
 
         file = self.folder / "rviz.png"
@@ -171,7 +171,7 @@ class Pair:
         return _pixels(QImage(str(file)))
 
     def ours(self) -> NDArray[np.uint8]:
-        """Return our picture."""
+        """Return our frame."""
         from PySide6.QtCore import QCoreApplication
 
         from rosglass.qml.elements.image_sinks import grab
@@ -217,7 +217,7 @@ def pair(app: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pair]:
 def difference(
     ours: NDArray[np.uint8], theirs: NDArray[np.uint8], *, has_texts: bool = False
 ) -> dict[str, Any]:
-    """Return in what two pictures differ; empty if they don't."""
+    """Return the differences of two images; empty if there are none."""
     found: dict[str, Any] = {}
     # RViz draws its last row and column again and again.
     ours, theirs = ours[4:-4, 4:-4], theirs[4:-4, 4:-4]
@@ -402,7 +402,7 @@ def test_arrays_and_delete_all_are_those_of_rviz(pair: Pair) -> None:
 
 
 def keep(name: str, ours: NDArray[np.uint8], theirs: NDArray[np.uint8]) -> None:
-    """Save both pictures side by side, where JUDGE_PICTURES names a folder."""
+    """Save both images side by side, where JUDGE_PICTURES names a folder."""
     folder = os.environ.get("JUDGE_PICTURES")
     if folder:
         from PySide6.QtGui import QImage

@@ -229,7 +229,7 @@ Visualization Manager:
     ("text", "error"),
     [("", "not an RViz config"), ("- a\n- b", "not an RViz config"), ("a: [", "expected")],
 )
-def test_a_file_that_is_none_changes_nothing(
+def test_invalid_config_changes_nothing(
     bench: SceneBench, tmp_path: Path, text: str, error: str
 ) -> None:
     file = tmp_path / "bad.rviz"
@@ -282,7 +282,7 @@ def test_panels_of_other_packages_are_named(bench: SceneBench, tmp_path: Path) -
     assert yaml.safe_load(file.read_text())["Panels"] == rows
 
 
-def test_what_rosglass_cannot_use_comes_back(bench: SceneBench, tmp_path: Path) -> None:
+def test_unsupported_settings_are_kept(bench: SceneBench, tmp_path: Path) -> None:
     file, again = tmp_path / "some.rviz", tmp_path / "again.rviz"
     view = {"Class": "some_lab/FancyView", "Name": "Current View", "Secret": 42,
             "Target Frame": "base_link", "Distance": 3}  # fmt: skip

@@ -82,7 +82,7 @@ def add(bench: SceneBench, robot: Robot, urdf: str = URDF, **settings: Any) -> A
 
 
 class Arc(NamedTuple):
-    """What is drawn of a joint, in the fixed frame.
+    """The drawing of a joint's effort, in the fixed frame.
 
     Attributes:
         color: RGBA bytes.
@@ -191,7 +191,7 @@ def test_the_head_points_where_the_torque_turns(
     assert (arc.second - arc.first) @ (arc.tip - arc.head) < 0
 
 
-def test_what_is_not_drawn_is_in_the_status(
+def test_joints_without_drawing_are_in_the_status(
     bench: SceneBench, robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass.scene.displays import effort
@@ -222,7 +222,7 @@ def test_what_is_not_drawn_is_in_the_status(
     assert arcs(display) == []
 
 
-def test_a_limit_of_zero_is_none(bench: SceneBench, robot: Robot) -> None:
+def test_limit_of_zero_is_a_warning(bench: SceneBench, robot: Robot) -> None:
     display = add(bench, robot, URDF.replace('effort="10"', 'effort="0"'))
     assert display.joints == ["drive", "elbow"]
     robot.place("upper")

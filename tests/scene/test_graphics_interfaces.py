@@ -24,7 +24,7 @@ _TIMEOUT_S = 60
 
 
 class Result(NamedTuple):
-    """What one graphics interface has drawn."""
+    """Images and picks by one graphics interface."""
 
     pictures: dict[str, NDArray[np.uint8]]
     found: dict[str, Any]
@@ -53,7 +53,7 @@ def result(process: subprocess.Popen[str], folder: Path) -> Result:
 
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Result]:
-    """What OpenGL and Vulkan have drawn, side by side."""
+    """The results of OpenGL and Vulkan, side by side."""
     driver = lavapipe()  # a graphics card would draw other pixels
     folder = tmp_path_factory.mktemp("graphics")
     opengl = start("opengl", folder / "opengl")

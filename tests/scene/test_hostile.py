@@ -1,4 +1,4 @@
-"""What a broken robot or an attacker sends to displays: fields of messages that lie, one by one."""
+"""Data of broken robots or attackers for displays: fields of messages that lie, one by one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from conftest import SceneBench
 
-#: What numpy computes of numbers that are too large is refused before, with the field's name.
+#: Numbers that overflow in numpy are refused before, with the field's name.
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
 
 # -- messages that are right -----------------------------------------------------------------------
@@ -321,7 +321,7 @@ class Robot:
         self.bench.wait(lambda: self.display.statusLevel == "ok", lambda: self.display.statusText)
 
     def send(self, message: dict[str, Any]) -> bool:
-        """Send a message, and wait until it is received; return False if there can be none."""
+        """Send a message, and wait until it is received; return False if it cannot be built."""
         from rosglass import Error
 
         display = self.display
@@ -557,7 +557,7 @@ def test_requests_that_move_the_camera_may_be_random(bench: SceneBench, watch: W
 
 @pytest.mark.parametrize("kind", ["PoseWithCovariance", "Odometry"])
 @pytest.mark.parametrize("number", [math.nan, sys.float_info.max])
-def test_a_pose_is_shown_without_a_covariance_that_is_none(
+def test_pose_is_shown_without_an_invalid_covariance(
     robot: Robot, kind: str, number: float
 ) -> None:
     robot.show(next(case for case in CASES if case.display == kind))
@@ -743,7 +743,7 @@ def test_all_interactive_markers_are_bounded(robot: Robot, monkeypatch: pytest.M
     assert "Marker large" not in display.statusText
 
 
-def test_a_second_topic_that_is_none_is_named_and_the_first_is_shown(robot: Robot) -> None:
+def test_invalid_second_topic_is_named_and_the_first_is_shown(robot: Robot) -> None:
     robot.show(next(case for case in CASES if case.display == "Map"))
     display, bench = robot.display, robot.bench
     display.reset()
@@ -754,7 +754,7 @@ def test_a_second_topic_that_is_none_is_named_and_the_first_is_shown(robot: Robo
     bench.wait(lambda: "Update Topic" not in display.statusText, lambda: display.statusText)
 
 
-def test_a_description_topic_that_is_none_is_among_what_is_left_out(robot: Robot) -> None:
+def test_invalid_description_topic_is_among_the_refused_settings(robot: Robot) -> None:
     display = robot.view.scene.add("RobotModel")
     (refused,) = display.load_settings({"Description Topic": {"Value": "not a topic"}})
     assert "Description Topic: expected the name of a topic" in refused

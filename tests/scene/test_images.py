@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from conftest import SceneBench
 
 WIDTH, HEIGHT = 200, 150
-#: Tells pictures apart.
+#: Numbers that make images differ.
 NUMBERS = itertools.count(1)
 #: The camera sits at (0, 0, 1) of the map and looks along x.
 OPTICAL = (-0.5, 0.5, -0.5, 0.5)
@@ -40,7 +40,7 @@ def picture_of(color: tuple[int, int, int], seconds: int = 7, **fields: Any) -> 
 
 
 def shown_of(display: Any) -> Any:
-    """Return the picture that a display shows; None without one."""
+    """Return the image that a display shows; None without one."""
     return display._picture
 
 
@@ -50,7 +50,7 @@ def infos_of(display: Any) -> Any:
 
 
 class Robot:
-    """Publishes pictures, CameraInfo and transforms."""
+    """Publishes images, CameraInfo and transforms."""
 
     def __init__(self, bench: SceneBench, topic: str = "/front/image") -> None:
         from rosglass.tf import TransformBroadcaster
@@ -61,7 +61,7 @@ class Robot:
         self.broadcaster = TransformBroadcaster(bench.robot)
 
     def show(self, display: Any, *color: int, **fields: Any) -> None:
-        """Publish a picture until the display shows it."""
+        """Publish an image until the display shows it."""
         message = picture_of((color or (0, 255, 255)), **fields)  # type: ignore[arg-type]
         stamp = message["header"]["stamp"]
         nanoseconds = stamp["sec"] * 1_000_000_000 + stamp["nanosec"]
@@ -176,7 +176,7 @@ def test_an_old_picture_fades_though_its_publisher_lives(
     display, robot = load(IMAGE + PANEL)
 
     def now() -> dict[str, Any]:
-        # The time of the second one tells whether it is late.
+        # The time of the second one decides whether it is late.
         seconds, nanoseconds = divmod(bench.robot.now().nanoseconds, 10**9)
         return {"frame_id": "camera", "stamp": {"sec": seconds, "nanosec": nanoseconds}}
 
@@ -309,7 +309,7 @@ def test_the_scene_fits_the_picture(bench: SceneBench, camera: tuple[Any, Robot]
     assert display.statusLevel == "ok", display.statusText
     assert pixel(bench, 50, 250) == (0, 0, 255), "the picture is behind"
     assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
-    # The picture is placed at its own time.
+    # The image is placed at its own time.
     robot.place(10, y=0.4)
     robot.show(display, 0, 0, 255, seconds=9)
     assert middle_of_ball(bench) == pytest.approx(expected(0.2), abs=2)

@@ -501,7 +501,7 @@ def test_an_own_menu_in_qml_and_programs_of_menus_are_not_run(
     assert len(server.events(MENU_SELECT)) == 1
 
 
-def test_what_is_under_the_mouse_is_lighter_and_the_status_bar_says_what_it_does(
+def test_hovered_marker_is_lighter_and_the_status_bar_describes_it(
     bench: SceneBench, show: Callable[..., Any], hand: Hand
 ) -> None:
     show(marker(control(BUTTON, boxes=True), menu_entries=MENU_ENTRIES))
@@ -724,7 +724,7 @@ def test_updates_that_come_before_the_markers_count_in_their_order(bench: SceneB
     take(3, "c")
     take(4, erased=("a",))
     assert display.markers == []
-    # All markers of before a change that is missing are no use.
+    # A full update from before a missing change is not used.
     take(1, "a", full=True)
     assert display.markers == []
     assert "waiting for its markers" in display.statusText
@@ -842,7 +842,7 @@ def test_markers_that_cannot_be_read_are_requested_again(
     bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
 
 
-def test_what_cannot_be_drawn_is_named_and_the_rest_is_shown(
+def test_invalid_markers_are_named_and_the_others_are_shown(
     bench: SceneBench,
     show: Callable[..., Any],
     server: MarkerServer,

@@ -254,7 +254,7 @@ def test_a_list_that_is_sent_again_is_drawn_in_each_picture(
     (cloud,) = drawables(display)
     assert (cloud.style, cloud.opaque) == ("boxes", False)
     bench.picture()
-    # As the same drawable, which is not uploaded in a later picture, as what is new may be.
+    # It stays the same drawable: a new one might be uploaded in a later frame.
     last = marker(7, points=points((0, 1, 0)), color=blue)
     assert drawables(show(last)) == [cloud]
     changed = bench.picture()
@@ -508,7 +508,7 @@ def test_a_marker_of_a_time_that_never_comes_is_dropped(
     assert "Transform [leg]" in display.statusText
 
 
-def test_what_cannot_be_placed_in_another_fixed_frame_is_hidden(
+def test_markers_without_transform_to_a_new_fixed_frame_are_hidden(
     bench: SceneBench, show: Callable[..., Any]
 ) -> None:
     send_static(bench.robot, "map", "arm", 2.0)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from conftest import SceneBench
 
-#: Seen from above, the middle of the picture is the origin, and 10 pixels are a metre.
+#: Seen from above, the middle of the frame is the origin, and 10 pixels are a metre.
 CENTER, PIXELS_PER_M = (150, 200), 10
 FLOAT32, UINT32 = 7, 6
 
@@ -71,7 +71,7 @@ class Shown:
         return display
 
     def at(self, x: float, y: float, picture: Any = None) -> tuple[int, ...]:
-        """Return the color of the picture at a place on the ground."""
+        """Return the color of the frame at a position on the ground."""
         picture = self.bench.picture() if picture is None else picture
         row, column = round(CENTER[0] - y * PIXELS_PER_M), round(CENTER[1] + x * PIXELS_PER_M)
         return tuple(int(part) for part in picture[row, column])
@@ -729,7 +729,7 @@ def test_the_brightness_of_hidden_points_is_half(bench: SceneBench) -> None:
     camera.color((0, 200, 100), 1)
     camera.depth([4000] * 4, 1)
     camera.color((200, 0, 0), 2)
-    # What hides is out of the picture.
+    # The points that hide others are out of the frame.
     camera.depth([60, 60, 60, 60], 2)
     bench.wait(lambda: camera.display.points == 8)
     assert tuple(bench.picture()[CENTER[0] - 40, CENTER[1] - 40]) == (0, 100, 50)

@@ -23,7 +23,7 @@ av = pytest.importorskip("av", reason='needs pip install "rosglass[video]"')
 
 
 def decode(path: Path) -> list[tuple[float, Any]]:
-    """Return times and pictures of a video."""
+    """Return times and frames of a video."""
     with av.open(str(path)) as container:
         return [(frame.time, frame.to_ndarray(format="rgb24")) for frame in container.decode()]
 
@@ -88,7 +88,7 @@ def test_a_window_at_rest_costs_nothing(bench: SceneBench, recorder: Any) -> Non
     assert times[-1] > 0.7
 
 
-def test_a_picture_too_many_is_none_that_was_dropped(
+def test_frame_beyond_the_rate_does_not_count_as_dropped(
     bench: SceneBench, recorder: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rosglass.scene.app.window_recorder._MAX_RATE_HZ", 0.01)

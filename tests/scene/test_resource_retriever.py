@@ -118,7 +118,7 @@ def raw(*lines: bytes) -> Callable[[BaseHTTPRequestHandler], None]:
         ),
     ],
 )
-def test_what_web_servers_answer_instead(web: WebServer, answer: Any, text: str) -> None:
+def test_failed_web_requests_are_reported(web: WebServer, answer: Any, text: str) -> None:
     if answer is not None:
         web.files["/a.stl"] = answer
     uri = f"{web.url}/a.stl"
@@ -133,7 +133,7 @@ def test_what_web_servers_answer_instead(web: WebServer, answer: Any, text: str)
     assert len(web.requests) == count
 
 
-def test_what_has_failed_can_be_tried_again(web: WebServer) -> None:
+def test_failed_resource_can_be_requested_again(web: WebServer) -> None:
     uri, retriever = f"{web.url}/a.stl", ResourceRetriever()
     for _ in range(2):
         with pytest.raises(ResourceError, match="404"):
@@ -176,7 +176,7 @@ def test_servers_that_answer_later_are_asked_for_one_file_each(web: WebServer) -
     assert not retriever.is_waiting
 
 
-def test_what_is_no_url_is_not_asked_for_again(web: WebServer) -> None:
+def test_invalid_url_is_not_requested_again(web: WebServer) -> None:
     retriever = ResourceRetriever()
     with pytest.raises(ResourceError, match=r"^http://\[1/a.stl: Invalid IPv6 URL"):
         retriever.find("http://[1/a.stl")
@@ -287,7 +287,7 @@ def ok(body: bytes, etag: str = "") -> dict[str, Any]:
     return {"status_code": 1, "etag": etag, "body": np.frombuffer(body, np.uint8)}
 
 
-def test_what_is_not_here_is_requested_from_the_robot(
+def test_missing_package_is_requested_from_the_robot(
     make_robot: Callable[..., Robot], cache: Path
 ) -> None:
     robot = make_robot()
@@ -313,7 +313,7 @@ def test_what_is_not_here_is_requested_from_the_robot(
         ({"status_code": 17}, f"{SERVICE} does not have it: status 17"),
     ],
 )
-def test_what_the_robot_does_not_have(
+def test_missing_resource_is_reported_with_the_reason(
     make_robot: Callable[..., Robot], response: dict[str, Any], text: str
 ) -> None:
     robot = make_robot()
@@ -321,7 +321,7 @@ def test_what_the_robot_does_not_have(
     uri = "package://my_arm/a.stl"
     with pytest.raises(ResourceError) as caught:
         robot.retriever.find(uri)
-    # Both what is wrong here, and why the robot is no help.
+    # Both the local error, and the robot's.
     assert "there is no package 'my_arm' in ROS_PACKAGE_PATH" in str(caught.value)
     assert f"nor does the robot serve it: the service {text}" in str(caught.value)
 
@@ -369,7 +369,7 @@ def test_a_service_can_be_named(make_robot: Callable[..., Robot]) -> None:
         ResourceRetriever().find("service:///provider:a.stl")
 
 
-def test_another_service_is_none(make_robot: Callable[..., Robot]) -> None:
+def test_service_of_another_type_is_not_used(make_robot: Callable[..., Robot]) -> None:
     robot = make_robot("/provider", "std_srvs/srv/Trigger")
     with pytest.raises(ResourceError):
         robot.retriever.find("service:///provider:a.stl")

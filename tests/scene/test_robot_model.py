@@ -220,7 +220,7 @@ def picture(width: int, height: int, color: int) -> bytes:
 def test_textures_beyond_the_limit_are_scaled_down(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Of ANYmal's 17 textures of 2048 x 2048 pixels, the last one was lost."""
+    """The last of ANYmal's 17 textures of 2048 x 2048 pixels was lost."""
     from rosglass.scene.displays import robot_model
     from rosglass.scene.render.drawing import Mesh
 
@@ -607,7 +607,7 @@ def test_all_meshes_of_a_robot_are_bounded(
     bench.wait(lambda: len(list(robot.root.drawables())) == 2)
 
 
-def test_of_descriptions_that_wait_the_newest_is_read(
+def test_newest_of_several_descriptions_is_read(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass.scene.displays import robot_model

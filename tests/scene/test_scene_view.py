@@ -63,7 +63,7 @@ def test_the_window_is_drawn_once_with_a_new_picture(bench: SceneBench) -> None:
     frames: list[int] = []
     bench.wait(lambda: bench.drawn() > 0)
     bench.picture()
-    bench.wait.nothing_happens(0.1)  # the picture that was grabbed has one more frame follow
+    bench.wait.nothing_happens(0.1)  # the grabbed frame is followed by one more
     bench.window.frameSwapped.connect(lambda: frames.append(bench.drawn()))
     for length in (2, 3, 4):
         before = bench.drawn()
@@ -147,7 +147,7 @@ def test_a_scene_that_changes_all_the_time_leaves_frames_to_qml(
         view.camera_moved()
 
     def share(count: int) -> float:
-        """Return the share of the window's frames that have a new picture of the scene."""
+        """Return the share of the window's frames that show a new frame of the scene."""
         frames.clear()
         bench.wait(lambda: len(frames) > count)
         return (frames[-1] - frames[0]) / (len(frames) - 1)
@@ -326,7 +326,7 @@ def test_a_display_in_a_frame_follows_it(bench: SceneBench) -> None:
     assert rows.mean() < 110
 
 
-def test_what_follows_a_frame_fades_as_soon_as_nobody_publishes_it(
+def test_display_of_a_frame_fades_once_the_frame_is_not_published(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass import Time
@@ -454,7 +454,7 @@ def test_python_gets_errors_for_bad_settings(
     assert view.scene.displays == []
 
 
-def test_python_gets_errors_for_what_is_no_display_or_view(bench: SceneBench) -> None:
+def test_invalid_displays_and_views_raise_in_python(bench: SceneBench) -> None:
     from rosglass.errors import Error
 
     view = bench.load("GridDisplay {}")
@@ -528,7 +528,7 @@ def test_picking_finds_the_nearest_drawable(bench: SceneBench) -> None:
     assert view.pick(middle.x, middle.y) is None
 
 
-def test_data_that_is_ahead_of_its_transform_is_no_error_for_a_second(bench: SceneBench) -> None:
+def test_data_ahead_of_its_transform_is_not_an_error_for_a_second(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster
 
@@ -716,7 +716,7 @@ def test_a_static_frame_is_shown_after_the_interval_in_which_it_came(bench: Scen
     bench.wait(lambda: frames.frames == ["arm", "hand", "map"])
 
 
-def test_what_follows_frames_fades_without_a_node(bench: SceneBench) -> None:
+def test_displays_of_frames_fade_without_a_node(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster
 
@@ -1096,7 +1096,7 @@ def test_the_first_frame_may_be_announced_with_further_ones(bench: SceneBench) -
 
     view = bench.load("AxesDisplay {}")
     bench.picture()
-    for _ in range(4):  # as of a thread that has drawn four frames meanwhile
+    for _ in range(4):  # as from a thread that has already drawn four frames
         QMetaObject.invokeMethod(view, "_take_mouse", Qt.ConnectionType.QueuedConnection)
     bench.wait(lambda: view.acceptedMouseButtons() == Qt.MouseButton.AllButtons)
     bench.wait.nothing_happens(0.1)
@@ -1137,7 +1137,7 @@ def boxes_in_a_row(count: int) -> list[Any]:
     return made
 
 
-def test_what_is_new_is_uploaded_over_several_pictures(
+def test_new_drawables_are_uploaded_over_several_frames(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass.scene.render import renderer as module
@@ -1228,7 +1228,7 @@ def test_a_grabbed_picture_shows_all(bench: SceneBench, monkeypatch: pytest.Monk
     bench.picture()
 
 
-def test_texts_that_are_taken_away_meanwhile_hide_nothing(
+def test_texts_removed_during_drawing_hide_nothing(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass.scene.render.drawing import Labels

@@ -197,7 +197,7 @@ def test_tools_are_added_and_removed(bench: SceneBench) -> None:
     assert changes[:2] == [9, 8]
 
 
-def test_what_was_removed_at_once_does_not_come_back(
+def test_display_or_tool_removed_at_once_does_not_come_back(
     bench: SceneBench, hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     topics = ["/first", "/second"]
@@ -348,7 +348,7 @@ def test_f_and_focus_camera_turn_the_camera(
     assert np.array(view.camera().focus) == pytest.approx(np.array((1, 1, 0)), abs=0.9)
 
 
-def test_what_comes_under_a_mouse_that_stands_still_is_found(bench: SceneBench, hand: Hand) -> None:
+def test_object_that_appears_under_a_still_mouse_is_found(bench: SceneBench, hand: Hand) -> None:
     view = bench.load()
     view.tool = "FocusCamera"
     hand.move((5, 5))  # Qt drops a move to where the last test has left it
@@ -941,7 +941,7 @@ def test_selected_points_are_dropped_with_their_cloud(bench: SceneBench) -> None
     bench.wait(lambda: view.selection.count == 0)
 
 
-def test_what_is_interactive_gets_the_mouse(bench: SceneBench, hand: Hand) -> None:
+def test_interactive_object_gets_the_mouse(bench: SceneBench, hand: Hand) -> None:
     view = bench.load()
     seen: list[str] = []
 
@@ -1204,7 +1204,7 @@ def test_a_goal_goes_to_the_topic_that_was_just_set(bench: SceneBench, nav2: Any
     bench.wait(lambda: driver.goals)
     goal.cancelGoal()
     bench.wait(lambda: not goal.goalActive)
-    goal.action = "served_by_nobody"
+    goal.action = "without_server"
     goal.send_pose(3.0, 2.0, 0.0)
     bench.wait(lambda: "looking for a server" in view.tools.outcome)
     goal.action = ""
@@ -1213,7 +1213,7 @@ def test_a_goal_goes_to_the_topic_that_was_just_set(bench: SceneBench, nav2: Any
     assert (len(before), len(after)) == (0, 1)
 
 
-def test_the_default_topic_of_the_other_rviz_is_none(bench: SceneBench) -> None:
+def test_default_topic_of_the_other_rviz_is_replaced(bench: SceneBench) -> None:
     tools = bench.load().tools
     old = {"Class": "rviz/SetGoal", "Topic": "/move_base_simple/goal"}
     own = {"Class": "rviz_default_plugins/SetGoal", "Topic": {"Value": "/move_base_simple/goal"}}

@@ -1,4 +1,4 @@
-"""What all displays of a topic do: bad names and frames, each message, another fixed frame."""
+"""Rules for all displays of a topic: bad names and frames, each message, another fixed frame."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_reference_frame_of_rviz_1_may_have_a_slash(bench: SceneBench) -> None
     bench.wait(lambda: all(one.statusLevel == "ok" for one in view.scene.displays))
 
 
-def test_a_topic_that_is_none_is_a_status_until_it_is_one(bench: SceneBench) -> None:
+def test_invalid_topic_is_an_error_until_it_is_valid(bench: SceneBench) -> None:
     view = bench.load(
         'PathDisplay {} ImageDisplay {} InteractiveMarkersDisplay {} PathDisplay { topic: "~plan" }'
     )
@@ -221,7 +221,7 @@ def test_a_kept_message_is_shown_once_a_new_fixed_frame_exists(
     assert display.statusLevel == "ok", display.statusText
 
 
-def test_what_waits_for_its_transform_is_all_shown_later(
+def test_messages_that_wait_for_their_transform_are_all_shown_later(
     bench: SceneBench, monkeypatch: Any
 ) -> None:
     from rosglass import Time
@@ -306,7 +306,7 @@ def test_bytes_of_what_waits_are_bounded(bench: SceneBench, monkeypatch: Any) ->
     assert sample.size == size
 
 
-def test_what_is_shown_fades_while_newer_data_waits_for_its_transform(bench: SceneBench) -> None:
+def test_shown_data_fades_while_newer_data_waits_for_its_transform(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster
 
@@ -341,7 +341,7 @@ def test_what_is_shown_fades_while_newer_data_waits_for_its_transform(bench: Sce
     assert display.statusLevel == "ok", display.statusText
 
 
-def test_what_is_shown_fades_while_newer_data_is_stamped_ahead(bench: SceneBench) -> None:
+def test_shown_data_fades_while_newer_data_is_stamped_ahead(bench: SceneBench) -> None:
     from rosglass.tf import Transform, TransformBroadcaster
 
     view = bench.load('PointStampedDisplay { topic: "/point" }')
@@ -435,7 +435,7 @@ def test_obstacles_fade_when_a_sensor_sends_nothing_any_more(
         ("RelativeHumidity", {"relative_humidity": 0.5}),
     ],
 )
-def test_what_a_robot_measures_all_the_time_fades_without_a_message(
+def test_continuous_measurements_fade_without_a_message(
     bench: SceneBench, monkeypatch: Any, kind: str, message: dict[str, Any]
 ) -> None:
     from rosglass.scene.displays import topic_display as displays

@@ -19,7 +19,7 @@ from waiting import eventually
 from rosglass.wires.zenoh.router import Router
 
 ROOT = Path(__file__).parents[2]
-#: Seconds for a busy machine to show the robot, and until the picture.
+#: Seconds for a busy machine to show the robot, and until the screenshot.
 _SHOWN_S = "12"
 #: Debian's Python, with RViz.
 RVIZ_PYTHON = ROOT / ".venv-system/bin/python"

@@ -62,7 +62,7 @@ def test_the_panel_lists_options_displays_and_settings(model: Any) -> None:
     assert labels(model)[:3] == ["Global Options", "Global Status", "Grid"]
 
 
-def test_what_the_user_enters_changes_settings_or_is_refused(bench: SceneBench, model: Any) -> None:
+def test_user_input_changes_settings_or_is_refused(bench: SceneBench, model: Any) -> None:
     (grid,) = bench.view.scene.displays
     said: list[str] = []
     model.refused.connect(said.append)
@@ -287,7 +287,7 @@ def test_displays_are_moved_by_keys(bench: SceneBench, grouped: Any) -> None:
     assert shift("Grid", "in") == ["Plan", "Grid", "Robot", [], "Axes"]
 
 
-def test_a_move_that_is_none_is_an_error(bench: SceneBench, grouped: Any) -> None:
+def test_invalid_move_raises(bench: SceneBench, grouped: Any) -> None:
     from rosglass.errors import Error
 
     scene = bench.view.scene
@@ -556,7 +556,7 @@ def test_typed_paths_are_taken_as_they_are(app: Any, chosen: str, meant: str) ->
     assert found.toLocalFile() == (os.path.expanduser(meant) if meant else "")  # noqa: PTH111
 
 
-def test_what_would_be_lost_is_asked_for(bench: SceneBench, tmp_path: Path) -> None:
+def test_unsaved_changes_prevent_closing(bench: SceneBench, tmp_path: Path) -> None:
     from rosglass import Time
     from rosglass.scene.app.program import ViewProgram
     from rosglass.tf import StaticTransformBroadcaster, Transform
@@ -565,7 +565,7 @@ def test_what_would_be_lost_is_asked_for(bench: SceneBench, tmp_path: Path) -> N
     program = ViewProgram()
     program.begin(view)
     assert program.mayClose()
-    # What the robot has is no change, e.g. its frames.
+    # The robot's own data, such as its frames, is not a change.
     broadcaster = StaticTransformBroadcaster(bench.robot)
     broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", "tool"))
     bench.wait(lambda: view.scene.find("TF").frames == ["map", "tool"])
@@ -577,7 +577,7 @@ def test_what_would_be_lost_is_asked_for(bench: SceneBench, tmp_path: Path) -> N
     assert program.mayClose()
     assert program.configName == "new.rviz"
     view.controller.set("Yaw", 0.1)
-    assert program.mayClose(), "where the camera stands is no change"
+    assert program.mayClose(), "moving the camera is not a change"
     view.scene.add("Axes")
     assert not program.mayClose()
     program.open(str(tmp_path / "new.rviz"))
@@ -601,7 +601,7 @@ def window(bench: SceneBench, request: pytest.FixtureRequest) -> Iterator[Any]:
     engine.rootContext().setContextProperty("program", program)
     engine.load(str(WINDOW))
     (window,) = engine.rootObjects()
-    # The first picture does not wait for the panels.
+    # The first frame does not wait for the panels.
     assert window.findChild(QObject, "displayRows") is None
     bench.wait(lambda: window.property("drawn"))
     assert window.findChild(QObject, "displayRows") is not None
@@ -674,7 +674,7 @@ def test_a_large_config_is_announced_once(bench: SceneBench, window: Any, tmp_pa
     scene.displaysChanged.connect(lambda: changes.append(len(scene.displays)))
     window.findChild(QObject, "scene").load_config(tmp_path / "large.rviz")
     assert changes == [401], "each change costs as much as there are displays"
-    # Panels of pictures are not made anew as others come and go.
+    # Panels of images are not made anew as others come and go.
     panels = window.findChild(QObject, "imagePanels")
     bench.wait(lambda: panels.property("item") is not None)
     (panel,) = panels.property("item").childItems()[:1]
@@ -845,7 +845,7 @@ def test_a_typed_frame_counts_when_the_user_goes_on(bench: SceneBench, window: A
     assert field.property("text") == "odom"
 
 
-def test_what_a_row_is_stands_beside_the_panel(bench: SceneBench, window: Any) -> None:
+def test_tool_tip_of_a_row_stands_beside_the_panel(bench: SceneBench, window: Any) -> None:
     from PySide6.QtCore import QObject, QPointF
     from PySide6.QtTest import QTest
 
@@ -1071,7 +1071,7 @@ def test_a_goal_is_canceled_by_its_button(bench: SceneBench, window: Any, nav2: 
     assert scene.property("statusText") == "Goal: canceled"
 
 
-def test_what_was_sent_is_shown_before_messages_and_without_panels(
+def test_sent_goals_are_shown_before_messages_and_without_panels(
     bench: SceneBench, window: Any
 ) -> None:
     from PySide6.QtCore import QObject

@@ -117,7 +117,7 @@ def test_the_command_offers_it_also_to_another_master(app: Any, tmp_path: Path) 
             process.wait()
 
 
-def test_of_two_views_with_the_same_names_one_waits_for_the_other(
+def test_one_of_two_views_with_the_same_names_waits_for_the_other(
     make_bench: Callable[[str], SceneBench], ros_master: RosMaster
 ) -> None:
     from rosglass.scene.overlays.view_control import control_of
