@@ -130,22 +130,22 @@ class ViewSettings:
         "bool",
         "Keyboard Navigation",
         True,
-        "Whether arrow keys shift the view, twice as fast with Shift, and Ctrl+D switches between "
+        "Let arrow keys shift the view, twice as fast with Shift, and Ctrl+D switch between "
         "2D and 3D, while the 3D view has the keyboard focus.",
     )
     speed = ControllerSetting(
         "float",
         "Movement Speed",
         4.0,
-        "Metres per second while an arrow key is held.",
+        "Speed of the view in m/s while an arrow key is held.",
         min=0.0,
         max=1000.0,
     )
     topics = ControllerSetting(
-        "bool", "Enable Topics", True, "Whether the mode and the tracked frame are published."
+        "bool", "Enable Topics", True, "Publish the mode and the tracked frame."
     )
     services = ControllerSetting(
-        "bool", "Enable Services", True, "Whether robots may move the camera through services."
+        "bool", "Enable Services", True, "Let robots move the camera through services."
     )
     namespace = ControllerSetting(
         "string",

@@ -154,7 +154,7 @@ class SceneAccess(Access):
 
     @property
     def fullscreen(self) -> bool:
-        """Whether the window fills the screen."""
+        """True while the window fills the screen."""
         window = window_of(self.scene_view)
         full = QtGui.QWindow.Visibility.FullScreen
         return window is not None and window.visibility() == full
@@ -171,7 +171,7 @@ class SceneAccess(Access):
 
     @property
     def bare(self) -> bool:
-        """Whether only the 3D view is to be shown; the program that shows panels follows it."""
+        """True if only the 3D view is to be shown; the program that shows panels follows it."""
         return bool(self.scene_view.bare)
 
     @bare.setter
@@ -396,7 +396,7 @@ class SceneViews(Views):
 
 
 class ScenePicker(Picker):
-    """Picks points and takes pictures of a scene."""
+    """Picks points and takes screenshots of a scene."""
 
     def __init__(self, access: SceneAccess) -> None:
         self._access, self._view = access, access.scene_view
@@ -415,7 +415,7 @@ class ScenePicker(Picker):
         return None if found is None else found.point
 
     def picture(self) -> Any:
-        """Return a picture of the 3D view with its overlays."""
+        """Return an image of the 3D view with its overlays."""
         image = self.window_picture()
         ratio = image.devicePixelRatio()
         view = self._view
@@ -424,13 +424,13 @@ class ScenePicker(Picker):
         return image.copy(left, top, round(rect.width() * ratio), round(rect.height() * ratio))
 
     def window_picture(self) -> Any:
-        """Return a picture of the whole window."""
+        """Return an image of the whole window."""
         window = window_of(self._view)
         if window is None or not window.isExposed() or not self._view.isVisible():
             raise Error("the 3D view is not visible")
         if self._access.is_drawing:
             raise Error("this cannot be called while the view is being drawn; use Qt.callLater()")
-        self._view.update()  # a change may wait for its picture
+        self._view.update()  # a change may wait for its frame
         return grab(window)
 
 

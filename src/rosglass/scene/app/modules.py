@@ -75,7 +75,7 @@ DISPLAYS = {
     "rosglass/QmlOverlay": "overlays.qml_overlay",
     "rosglass/ViewController": "overlays.view_controller",
 }
-#: Displays that are no types of QML.
+#: Displays that are not types of QML.
 _NOT_IN_QML = ("Group", "rosglass/QmlOverlay")
 #: Types of QML that come with a module of displays, and their classes.
 _ITEMS = {

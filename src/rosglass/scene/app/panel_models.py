@@ -70,10 +70,10 @@ class PanelRow(NamedTuple):
 
 
 class _Landing(NamedTuple):
-    """Where a display goes that is dropped.
+    """The destination of a dropped display.
 
     Attributes:
-        group: Its group there.
+        group: The group.
         before: The display that it goes in front of; None for the end.
         row: The row that it goes in front of.
         depth: Levels of indentation there.
@@ -155,7 +155,7 @@ class DisplaysModel(QAbstractListModel):
     viewChanged = Signal()
     #: The user has entered something that does not fit: why.
     refused = Signal(str)
-    #: What the user has entered is set.
+    #: The user's input was set.
     accepted = Signal()
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
@@ -200,7 +200,7 @@ class DisplaysModel(QAbstractListModel):
 
     @property
     def rows(self) -> list[PanelRow]:
-        """What is shown, from the top."""
+        """The visible rows, from the top."""
         return list(self._rows)
 
     # -- Qt's model ------------------------------------------------------------------------------

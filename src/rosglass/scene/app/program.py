@@ -67,7 +67,7 @@ def config_file(place: str | os.PathLike[str]) -> Path:
 
 
 class ViewProgram(QtCore.QObject):
-    """What the window of ``rosglass view`` shows beside its view, and what its buttons do.
+    """The model of the window of ``rosglass view``: its texts, and the actions of its buttons.
 
     Args:
         config: The ``.rviz`` file to open; empty for RViz's default, a grid.
@@ -76,7 +76,7 @@ class ViewProgram(QtCore.QObject):
         overlays: QML files to show over the view, the last one on top.
         watch: Whether to reload these when a file in their folders is saved.
         import_paths: Additional folders with QML modules, for these.
-        recorder: What records the window; None for nothing.
+        recorder: The recorder of the window; None without one.
 
     Raises:
         Error: The config cannot be read.
@@ -253,7 +253,7 @@ class ViewProgram(QtCore.QObject):
             return b""
         config = self._view.collect_config()
         manager = dict(config.manager)
-        # Where the camera stands is no change worth a question.
+        # A moved camera alone does not ask the user to save.
         manager["Views"] = {**manager.get("Views", {}), "Current": None}
         return pickle.dumps(manager)
 

@@ -1,4 +1,4 @@
-"""Records a window as a video: each picture that it shows, read back from the GPU."""
+"""Records a window as a video: each frame that it shows, read back from the GPU."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["WindowRecorder"]
 
 _log = logging.getLogger("rosglass.scene")
-#: Most pictures in a second, and how much earlier than planned one may be: windows are drawn in
+#: Maximum frames per second, and how much earlier than planned a frame may be: windows are drawn in
 #: steps of the screen's own rate.
 _MAX_RATE_HZ, _EARLY_S = 30.0, 0.005
 _FORMATS = {QRhiTexture.Format.RGBA8: "rgba", QRhiTexture.Format.BGRA8: "bgra"}
@@ -50,19 +50,19 @@ class WindowRecorder(QtCore.QObject):
         self.path = self._writer.path
         self._window: Any = None
         self._started = 0.0
-        #: When a picture was last taken or dropped, by :func:`time.monotonic`.
+        #: When a frame was last taken or dropped, by :func:`time.monotonic`.
         self._taken = -1.0
-        #: The picture that the GPU is reading back.
+        #: The frame that the GPU is reading back.
         self._reading: QRhiReadbackResult | None = None
         self._problem = ""
-        #: Draws once more for a picture that was left out, which might be the last one.
+        #: Draws once more after a skipped frame, which might have been the last one.
         self._later = QtCore.QTimer(self)
         self._later.setSingleShot(True)
         self._later.timeout.connect(self._draw)
 
     @property
     def text(self) -> str:
-        """What to show in a status bar; empty while nothing is recorded."""
+        """The text for a status bar; empty while nothing is recorded."""
         if self._window is None or self._problem:
             return ""
         seconds = int(time.monotonic() - self._started)
@@ -96,7 +96,7 @@ class WindowRecorder(QtCore.QObject):
 
     @Slot()
     def _on_rendered(self) -> None:
-        """Have the picture read back, which the window is about to show."""
+        """Start reading back the frame that the window is about to show."""
         self._take()  # of a window that was grabbed, and not shown
         now = time.monotonic()
         wait = self._taken + 1 / _MAX_RATE_HZ - now
@@ -126,7 +126,7 @@ class WindowRecorder(QtCore.QObject):
         self._take()
 
     def _take(self) -> None:
-        """Give the picture that was read back to the encoder."""
+        """Pass the frame that was read back to the encoder."""
         reading, self._reading = self._reading, None
         if reading is None:
             return

@@ -129,7 +129,7 @@ class DisplayConfig(_Entry):
 
     @property
     def enabled(self) -> bool:
-        """Whether it is shown."""
+        """True if the display is shown."""
         given = self.settings.get("Enabled", self.settings.get("Value", True))
         try:
             return read_bool(given)
@@ -145,7 +145,7 @@ class DisplayConfig(_Entry):
 
     @property
     def is_group(self) -> bool:
-        """Whether it is a group of displays."""
+        """True for a group of displays."""
         return self.type == "Group"
 
     @property
@@ -243,7 +243,7 @@ class RvizConfig:
         self.ros = ros
         #: The file's path, for messages.
         self.source = ""
-        #: What is wrong with single entries, e.g. displays without a class, a line for each.
+        #: Problems of single entries, e.g. displays without a class, a line for each.
         self.warnings: list[str] = []
         #: The file's tree.
         self.root: dict[str, Any] = {

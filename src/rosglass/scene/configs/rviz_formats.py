@@ -295,7 +295,7 @@ _DURABILITIES = {
     "Transient Local": Durability.TRANSIENT_LOCAL,
 }
 _HISTORIES = {"Keep Last": History.KEEP_LAST, "Keep All": History.KEEP_ALL}
-#: What RViz 1 calls the setting ``Topic``, by type of display.
+#: Names of the setting ``Topic`` in RViz 1, by type of display.
 _ROS1_TOPICS = {
     "Camera": "Image Topic",
     "Image": "Image Topic",
@@ -431,7 +431,7 @@ def _policy(
 
 
 class DescriptionSetting(NamedTuple):
-    """Where a robot's description (URDF) comes from."""
+    """The source of a robot's description (URDF)."""
 
     #: ``parameter`` (RViz 1), ``topic`` or ``file`` (RViz 2).
     source: str

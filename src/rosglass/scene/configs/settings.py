@@ -121,14 +121,14 @@ class Setting(Writable[Any]):
 
 
 class Configurable:
-    """What has settings; a base class beside a QObject.
+    """Mix-in for QObjects with settings.
 
     Attributes:
         SETTINGS: All settings by their path, those of base classes first.
     """
 
     SETTINGS: ClassVar[dict[str, Setting]] = {}
-    #: Values of settings whose value in a file did not fit, as they were set instead.
+    #: Values that replaced invalid ones of a file, by setting.
     _instead: Mapping[str, Any] = {}
 
     def _setting(self, path: str) -> Setting:
@@ -140,7 +140,7 @@ class Configurable:
 
     @property
     def label(self) -> str:
-        """What has the settings, in error messages."""
+        """The name of the owner of the settings, in error messages."""
         return type(self).__name__
 
     def get(self, path: str) -> Any:

@@ -32,12 +32,12 @@ class QmlOverlayDisplay(Display):
     TYPE = "rosglass/QmlOverlay"
 
     path = Setting(
-        "Path", "path", "", "The QML file; package://name/path for one in a ROS package.",
+        "Path", "path", "", "QML file; package://name/path for one in a ROS package.",
         then="_schedule",
     )  # fmt: skip
     zIndex = Setting("Z-Index", "int", 0, "Higher numbers are on top.", then="_arrange")
     scale = Setting(
-        "Scale", "float", 1.0, "Units of the view for each of the overlay.", min=0.1, max=10.0,
+        "Scale", "float", 1.0, "Units of the view per unit of the overlay.", min=0.1, max=10.0,
         then="_arrange",
     )  # fmt: skip
     opacity = Setting("Opacity", "float", 1.0, "Opacity.", min=0.0, max=1.0, then="_arrange")

@@ -1,6 +1,6 @@
 """QML files over a scene, with the object ``rviz``, as ``rosglass rviz`` shows them over RViz.
 
-The interface is drawn by the window itself, above the 3D picture; nothing is copied.
+The interface is drawn by the window itself, above the 3D view; nothing is copied.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SceneOverlay", "add_overlay"]
 
-#: Of the lowest overlay, among the items of a view.
+#: Z of the lowest overlay, among the items of a view.
 _LOWEST_Z = 1000
 
 

@@ -46,7 +46,7 @@ class ViewControl(QtCore.QObject):
         #: The camera.
         self.view = access.view
         self._displays: list[ViewControllerDisplay] = []
-        #: What is to be closed.
+        #: The parts to close.
         self._parts: list[ViewKeys | ViewServices] = []
         #: The topics and services; None while there is no display.
         self.services: ViewServices | None = None

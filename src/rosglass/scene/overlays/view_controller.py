@@ -50,13 +50,13 @@ class ViewControllerDisplay(Display):
     enableTopics = _shared(ViewSettings.topics)
     enableServices = _shared(ViewSettings.services)
     namespace = _shared(ViewSettings.namespace)
-    #: Of the camera, which files do not keep.
+    #: State of the camera, which files do not keep.
     trackedFrame = Setting(
         _TRACKED_FRAME, "frame", "",
         "The frame that the camera follows and turns with; empty for none.", then="_track",
     )  # fmt: skip
     mode2D = Setting(
-        _MODE_2D, "bool", False, "Whether to look straight down, without perspective.",
+        _MODE_2D, "bool", False, "Look straight down, without perspective.",
         then="_set_mode",
     )  # fmt: skip
 

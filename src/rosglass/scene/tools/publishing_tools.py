@@ -73,13 +73,14 @@ class PublishingTool(Tool):
     TOPICS: ClassVar[tuple[str, str]] = ("", "")
 
     topic = Setting(
-        "Topic", "topic", "", "Topic to publish on; RViz's own if it is empty.", then="_schedule"
+        "Topic", "topic", "", "Topic to publish on; empty for RViz's default.", then="_schedule"
     )
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
-        #: What waits for the publisher and its first subscriber, and until when, monotonic.
+        #: A message that waits for the publisher and its first subscriber, and its monotonic
+        #: deadline.
         self._waiting: tuple[dict[str, Any], str, float] | None = None
         self._created_at = 0.0
         self._qos = _QOS
@@ -266,7 +267,7 @@ class PoseTool(PublishingTool):
     """
 
     _HELP = "Click and drag mouse to set position/orientation."
-    #: Of the arrow.
+    #: Color of the arrow.
     _COLOR: ClassVar[tuple[float, ...]] = (0.0, 1.0, 0.0, 1.0)
 
     #: A pose was set: x and y in metres, yaw in radians, in the fixed frame.
@@ -362,7 +363,7 @@ class PoseTool(PublishingTool):
 
 
 class SetInitialPoseTool(PoseTool):
-    """RViz's 2D Pose Estimate: tells localization where the robot is."""
+    """RViz's 2D Pose Estimate: sets the robot's pose for localization."""
 
     TYPE, NAME, KEY = "SetInitialPose", "2D Pose Estimate", "p"
     DESCRIPTION = "Sends where the robot is: press at its position, drag to its direction."
@@ -420,7 +421,7 @@ class SetGoalTool(PoseTool):
     TOPICS = ("/move_base_simple/goal", "/goal_pose")
 
     topic = Setting(
-        "Topic", "topic", "", "Topic to publish on; RViz's own if it is empty.", then="_schedule",
+        "Topic", "topic", "", "Topic to publish on; empty for RViz's default.", then="_schedule",
         shown_if={"action": ""},
     )  # fmt: skip
     action = Setting(

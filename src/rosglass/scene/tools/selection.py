@@ -1,4 +1,4 @@
-"""What is selected in a view: parts of displays, with their descriptions, marked by boxes."""
+"""The selection of a view: parts of displays, with their descriptions, marked by boxes."""
 
 from __future__ import annotations
 
@@ -65,10 +65,10 @@ class SelectedPart(NamedTuple):
 
 
 class _Marked(NamedTuple):
-    """What is selected of one drawable.
+    """The selected part of one drawable.
 
     Attributes:
-        indices: Numbers of its points, lines, instances or cells, in order.
+        indices: Indices of its points, lines, instances or cells, in order.
         geometry: Its data when it was selected: new points are others.
         whole: Whose only part all of it is, e.g. a link of a robot; None where each number is one.
     """
@@ -79,21 +79,21 @@ class _Marked(NamedTuple):
 
 
 class Selection(QtCore.QObject):
-    """What is selected in a view.
+    """The selection of a view.
 
     Args:
         view: The view.
-        overlay: Where the boxes are drawn.
-        drawables: Returns what is drawn, see
+        overlay: The group in which the boxes are drawn.
+        drawables: Returns the drawables, see
             :meth:`rosglass.scene.render.scene_tree.Group.drawables`.
         camera: Returns the view's camera.
     """
 
     changed = Signal()
 
-    #: How many parts are selected.
+    #: Number of selected parts.
     count = Property(int, len, notify=changed)
-    #: What is selected, at most 200 parts: ``display``, ``part`` and ``lines`` of name and value.
+    #: The selected parts, at most 200: ``display``, ``part`` and ``lines`` of name and value.
     parts = Property(_LIST, lambda self: self._for_qml(), notify=changed)
 
     def __init__(

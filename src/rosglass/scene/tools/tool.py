@@ -69,24 +69,24 @@ _CURSORS = {
 
 
 class ToolView(Protocol):
-    """What tools use of their view, a ``SceneView``; see there."""
+    """The part of a ``SceneView`` that tools use; see there."""
 
     scene: Scene
     overlay: Group
 
     @property
     def controller(self) -> ViewController:
-        """What moves the camera."""
+        """The view controller, which moves the camera."""
 
     @property
     def selection(self) -> Selection:
-        """What is selected."""
+        """The selection."""
 
     def camera(self) -> Camera:
-        """Return the camera of the next picture."""
+        """Return the camera of the next frame."""
 
     def pick(self, x: float, y: float) -> Hit | None:
-        """Return what is nearest to the camera at a point of the view."""
+        """Return the hit nearest to the camera at a point of the view."""
 
     def move_camera(self, change: Callable[[ViewController], bool | None]) -> bool:
         """Turn the camera to another view; return whether there was a change."""
@@ -134,7 +134,7 @@ class PointerEvent:
 
     @cached_property
     def hit(self) -> Hit | None:
-        """What is under the pointer; None for nothing."""
+        """The hit under the pointer; None for nothing."""
         return self.view.pick(self.x, self.y)
 
     @property
@@ -222,7 +222,7 @@ class Tool(Configurable, Element):
     type = Property(str, lambda self: self.TYPE, constant=True)
     #: Whether it is the current tool.
     selected = ReadOnly(bool, False)
-    #: What to do now, for a status bar; bold as in HTML.
+    #: Instructions for a status bar; bold as in HTML.
     statusText = ReadOnly(str, "")
 
     def __init__(
@@ -234,13 +234,13 @@ class Tool(Configurable, Element):
         self._name = ""
         self._key: str | None = None
         self._has_hit = False
-        #: Whether it was removed, and waits to be destroyed.
+        #: True once it was removed and waits to be destroyed.
         self._is_removed = False
         #: Whether it uses the node; only then it joins the session.
         self._uses_node = False
         #: RViz's class, as the file had it; RViz 2's for new ones.
         self.class_id = TOOLS.get(self.TYPE, ("", ""))[1]
-        #: What a ``.rviz`` file had for it, and its settings then.
+        #: The tool's entry in a ``.rviz`` file, and its settings then.
         self.saved: dict[str, Any] = {}
         self.loaded: dict[str, Any] = {}
         super().__init__(parent, runtime)
@@ -459,9 +459,9 @@ class Tools(QtCore.QObject):
     all = Property(_LIST, lambda self: list(self._items), notify=changed)
     #: The tool that has the mouse; null where there is none.
     current = Property(QtCore.QObject, lambda self: self._current, notify=currentChanged)
-    #: What the current tool says, or for some seconds what one has done.
+    #: The current tool's instructions, or for some seconds the outcome of its last action.
     statusText = ReadOnly(str, "")
-    #: What a tool has done in the last seconds, as plain text; empty otherwise.
+    #: The outcome of a tool's action in the last seconds, as plain text; empty otherwise.
     outcome = ReadOnly(str, "")
 
     def __init__(self, view: Any, runtime: Runtime | None = None) -> None:
@@ -470,7 +470,7 @@ class Tools(QtCore.QObject):
         self._runtime = runtime
         self._items: list[Tool] = []
         self._current: Tool | None = None
-        #: Who has the drag in progress: "tool", "camera", or "none" after it was cancelled.
+        #: The owner of the drag in progress: "tool", "camera", or "none" after it was cancelled.
         self._grab = ""
         self._held = Button.NONE
         self._modifiers = Modifier.NONE
@@ -632,7 +632,7 @@ class Tools(QtCore.QObject):
         """Return the first tool of a name, type or class id.
 
         Raises:
-            ArgumentError: It is no text.
+            ArgumentError: The name is not a string.
         """
         if not isinstance(name, str):
             raise ArgumentError("name", name, "the name, type or class id of a tool")
@@ -776,12 +776,12 @@ class Tools(QtCore.QObject):
 
     @property
     def holds_mouse(self) -> bool:
-        """Whether the mouse drags the camera, or what belongs to a tool."""
+        """True while the mouse drags the camera or something of a tool."""
         return self._grab in ("camera", "tool")
 
     @property
     def moves_camera(self) -> bool:
-        """Whether the camera is being dragged."""
+        """True while the camera is being dragged."""
         return self._grab == "camera"
 
     def on_press(self, event: PointerEvent) -> bool:

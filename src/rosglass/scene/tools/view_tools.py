@@ -35,7 +35,7 @@ class Interactive(Protocol):
 
     @property
     def help(self) -> str:
-        """What the mouse does to it, for the status bar."""
+        """The instructions for the status bar."""
 
     def handle_pointer(self, what: str, event: PointerEvent) -> bool:
         """Handle an event of the tool Interact.
@@ -83,13 +83,13 @@ class InteractTool(MoveCameraTool):
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
-        #: What is under the mouse, or is being dragged.
+        #: The object under the mouse, or the one that is being dragged.
         self._focused: Interactive | None = None
         super().__init__(parent, runtime)
 
     @property
     def focused(self) -> Interactive | None:
-        """What handles the mouse now; None for the camera."""
+        """The object that handles the mouse now; None for the camera."""
         return self._focused
 
     def _focus(self, event: PointerEvent) -> None:
@@ -198,7 +198,7 @@ class MeasureTool(Tool):
     #: A distance was measured: metres.
     measured = Signal(float)
 
-    color = Setting("Line color", "color", "#ffd500", "Of the line.")
+    color = Setting("Line color", "color", "#ffd500", "Color of the line.")
     #: Metres between the points; -1 before the second one.
     length = ReadOnly(float, -1.0)
 

@@ -1,7 +1,7 @@
 import QtQuick
 import RosScene 1.0
 
-// The picture of an ImageDisplay, or of a CameraDisplay with the scene in it.
+// Shows the image of an ImageDisplay, or of a CameraDisplay with the scene in it.
 Rectangle {
     id: panel
 

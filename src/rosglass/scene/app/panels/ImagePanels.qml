@@ -1,7 +1,7 @@
 import QtQuick
 import RosScene 1.0
 
-// A panel over a view for each display of pictures in it; the user may move, resize and close them.
+// A panel over a view for each of its image displays; the user may move, resize and close them.
 Item {
     id: area
 

@@ -1,15 +1,15 @@
 import QtQuick
 import RosScene 1.0
 
-// The window of `rosglass view`: the 3D view, and what is around it once the first picture is on the screen, as
+// The window of `rosglass view`: the 3D view, and the panels around it, which are loaded after the first frame, as
 // loading Qt's controls takes long. `program` is a ViewProgram.
 Window {
     id: window
 
     property bool panels: !program.kiosk
-    // Whether the first picture is on the screen.
+    // True once the first frame is on the screen.
     property bool drawn: false
-    // Where the 3D view is; until the panels are there, about where it will be.
+    // The rectangle of the 3D view; an estimate until the panels are loaded.
     readonly property rect place: around.item ? around.item.place : !panels ? Qt.rect(0, 0, width, height)
         : Qt.rect(left, 27, Math.max(width - left - (program.hidesRightDock ? 0 : 252), 100), Math.max(height - 49, 0))
     readonly property int left: program.hidesLeftDock ? 0 : 332
@@ -21,7 +21,7 @@ Window {
     title: (program.configName || "new view") + (program.modified ? " *" : "") + " - rosglass"
 
     Component.onCompleted: { scene.bare = !panels; program.begin(scene) }
-    // Later: the picture is not on the screen before this handler has ended.
+    // Later, because the frame reaches the screen only after this handler.
     onFrameSwapped: if (!drawn) Qt.callLater(showPanels)
     onPanelsChanged: scene.bare = !panels
 
@@ -41,10 +41,10 @@ Window {
         height: window.place.height
         focus: true
         focusOnClick: true
-        // Overlays may want it alone.
+        // Overlays may request the view alone.
         onBareChanged: window.panels = !bare
 
-        // Its types are loaded with the first display of pictures.
+        // Its types are loaded with the first image display.
         Loader {
             objectName: "imagePanels"
             anchors.fill: parent
