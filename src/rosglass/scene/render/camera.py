@@ -46,10 +46,10 @@ _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class Seen(NamedTuple):
-    """Where a point is seen.
+    """The position of a point in the image.
 
     Attributes:
-        x: Units of the item, from its left edge; NaN behind the camera.
+        x: In units of the item, from its left edge; NaN behind the camera.
         y: The same, from its upper edge.
         depth: Metres from the camera; NaN behind it.
     """
@@ -68,7 +68,7 @@ class Camera:
 
     Attributes:
         pose: Its pose in the fixed frame, 4 x 4.
-        size: Width and height of the picture, in units of the item (pixels where its scale is 1).
+        size: Width and height of the image, in units of the item (pixels where its scale is 1).
         fov: Vertical field of view in radians; None for an orthographic camera.
         scale: Units of the item per metre; of an orthographic camera only.
         near: Metres to the near plane. A perspective camera has no far plane.
@@ -117,17 +117,17 @@ class Camera:
 
     @property
     def is_orthographic(self) -> bool:
-        """Whether what is far away is shown as large as what is near."""
+        """True if the projection is orthographic: distant objects look as large as near ones."""
         return self.fov is None
 
     @property
     def eye(self) -> Point:
-        """Where the camera is, in the fixed frame."""
+        """The position of the camera, in the fixed frame."""
         return point_of(self.pose[:3, 3])
 
     @property
     def focus(self) -> Point:
-        """What it looks at, in the fixed frame."""
+        """The point that it looks at, in the fixed frame."""
         return point_of(self.pose[:3, 3] - self.pose[:3, 2] * self.focus_distance)
 
     @cached_property
@@ -179,7 +179,7 @@ class Camera:
         return Seen(float((x + 1) / 2 * width), float((1 - y) / 2 * height), depth)
 
     def ray(self, x: float, y: float) -> tuple[Point, Point]:
-        """Return the ray from the camera through a place of the picture, in the fixed frame.
+        """Return the ray from the camera through a point of the image, in the fixed frame.
 
         Args:
             x: Units of the item, from its left edge.
@@ -200,7 +200,7 @@ class Camera:
 
 @dataclass(frozen=True, eq=False)
 class PinholeCamera(Camera):
-    """A camera of the robot: what it looks at need not be in the middle of the picture.
+    """A camera of the robot, whose optical axis may miss the middle of the image.
 
     Attributes:
         focal: Focal lengths to the right and downwards, in units of the item.
@@ -243,7 +243,7 @@ class PinholeCamera(Camera):
         return matrix
 
     def ray(self, x: float, y: float) -> tuple[Point, Point]:
-        """Return the ray from the camera through a place of the picture, in the fixed frame."""
+        """Return the ray from the camera through a point of the image, in the fixed frame."""
         right = (x - self.centre[0]) / self.focal[0]
         down = (y - self.centre[1]) / self.focal[1]
         turn, origin = self.pose[:3, :3], self.pose[:3, 3]

@@ -1,7 +1,7 @@
-"""What a scene draws: points, lines, meshes, maps and labels, as numpy arrays.
+"""The drawables of a scene: points, lines, meshes, maps and labels, as numpy arrays.
 
-Displays fill these; the renderer (:mod:`rosglass.scene.render.renderer`) uploads what has changed
-and draws it, the picker intersects it with rays. No Qt here. Arrays are never written after they
+Displays fill these; the renderer (:mod:`rosglass.scene.render.renderer`) uploads and draws
+changes, the picker intersects it with rays. No Qt here. Arrays are never written after they
 were given: a change gives a new one, so that a renderer in another thread may still read the old
 one.
 """
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["OPAQUE", "Coloring", "Labels", "Lines", "MapImage", "Mesh", "Points"]
 
-#: What RViz takes for opaque: more than this is drawn without blending.
+#: Opacity from which RViz draws without blending.
 OPAQUE = 0.9998
 
 
@@ -192,7 +192,7 @@ class Points(Drawable):
 
     @property
     def opaque(self) -> bool:
-        """Whether nothing behind it shines through."""
+        """True if nothing behind it shines through."""
         paint = self.coloring
         return self.alpha >= OPAQUE and not (paint.mode == "bgra" and paint.per_point_alpha)
 
@@ -296,7 +296,7 @@ class Lines(Drawable):
 
     @property
     def opaque(self) -> bool:
-        """Whether nothing behind it shines through."""
+        """True if nothing behind it shines through."""
         return self._opaque and self.alpha >= OPAQUE
 
     def _find_bounds(self) -> Box | None:
@@ -374,7 +374,7 @@ class Mesh(Drawable):
 
     @property
     def opaque(self) -> bool:
-        """Whether nothing behind it shines through."""
+        """True if nothing behind it shines through."""
         return (
             self._opaque and self.shape.opaque and self.texture_opaque and self.color[3] >= OPAQUE
         )
@@ -447,7 +447,7 @@ class MapImage(Drawable):
 
     @property
     def opaque(self) -> bool:
-        """Whether nothing behind it shines through."""
+        """True if nothing behind it shines through."""
         return self.alpha >= OPAQUE and bool((self.palette[:, 3] == 255).all())
 
     def _find_bounds(self) -> Box | None:
@@ -521,7 +521,7 @@ class Labels(Drawable):
 
     @property
     def opaque(self) -> bool:
-        """Whether nothing behind it shines through: never, for the edges of letters are soft."""
+        """True if nothing behind it shines through: never, as the edges of letters are soft."""
         return False
 
     def _find_bounds(self) -> Box | None:

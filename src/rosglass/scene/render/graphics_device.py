@@ -47,7 +47,7 @@ __all__ = [
     "reduce_image",
 ]
 
-#: Bytes of the block in shaders/frame.glsl that all drawables of a picture share.
+#: Bytes of the block in shaders/frame.glsl that all drawables of a frame share.
 FRAME_BYTES = 144
 _SHADERS = Path(__file__).with_name("shaders")
 _STAGES = (
@@ -105,7 +105,7 @@ class GraphicsDevice:
         self.smooth = self._sampler(QRhiSampler.Filter.Linear, QRhiSampler.AddressMode.Repeat)
         self.sharp = self._sampler(QRhiSampler.Filter.Nearest, QRhiSampler.AddressMode.ClampToEdge)
         self.white: QRhiTexture | None = None
-        #: Where the camera is, from the renderer's origin.
+        #: The camera's position, from the renderer's origin.
         self.eye = np.zeros(3)
         self.shapes: dict[Shape, ShapeBuffers] = {}
         #: The images of meshes by the id of their pixels.

@@ -31,9 +31,9 @@ def instance_matrix(
     rotation: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
     scale: Sequence[float] | float = 1.0,
 ) -> NDArray[np.float64]:
-    """Return the matrix of a place, a quaternion (x, y, z, w) and a scale.
+    """Return the matrix of a position, a quaternion (x, y, z, w) and a scale.
 
-    A quaternion of length 0 is no rotation, others are normalised, as RViz does it.
+    A quaternion of length 0 counts as the identity; others are normalised, as in RViz.
     """
     x, y, z, w = (float(number) for number in rotation)
     most = max(abs(x), abs(y), abs(z), abs(w))
@@ -68,7 +68,7 @@ def matrix_of(pose: Any) -> NDArray[np.float64]:
     """Return the matrix of a ``geometry_msgs/Pose``.
 
     Raises:
-        Error: It has numbers that cannot be drawn, or a quaternion that is none.
+        Error: It has numbers that cannot be drawn, or an invalid quaternion.
     """
     at, turn = pose.position, pose.orientation
     position, rotation = (at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w)
@@ -88,7 +88,7 @@ def stack_poses(poses: Any) -> NDArray[np.float64]:
 def poses_matrices(positions: Any, rotations: Any) -> NDArray[np.float64]:
     """Return matrices (n, 4, 4) of positions (n, 3) and quaternions x, y, z, w (n, 4).
 
-    A quaternion of length 0 is no rotation, others are normalised, as RViz does it.
+    A quaternion of length 0 counts as the identity; others are normalised, as in RViz.
     """
     at = np.asarray(positions, np.float64).reshape(-1, 3)
     q = np.asarray(rotations, np.float64).reshape(-1, 4)

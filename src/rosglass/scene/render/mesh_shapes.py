@@ -131,7 +131,7 @@ def _box_shape() -> Shape:
         for side in (-1.0, 1.0):
             u, v = (axis + 1) % 3, (axis + 2) % 3
             normal = [side * (n == axis) for n in range(3)]
-            # Each side has the whole picture, as in RViz.
+            # Each side has the whole image, as in RViz.
             up = np.array([0.0, 0.0, 1.0] if axis < 2 else [0.0, 1.0, 0.0])
             right = np.cross(up, normal)
             quad = [(-side, -1), (side, -1), (side, 1), (-side, 1)]
@@ -180,7 +180,7 @@ def _sphere_shape(rings: int = 16) -> Shape:
     return _turned(
         [(0.5 * math.cos(t), 0.5 * math.sin(t), math.cos(t), math.sin(t)) for t in tilt],
         2 * rings,
-        # A picture of the earth, as in RViz.
+        # Mapped like an image of the earth, as in RViz.
         lambda turns, z: _places(turns + 0.5, math.acos(min(max(2 * z, -1.0), 1.0)) / math.pi),
     )
 
@@ -191,9 +191,9 @@ def _places(across: NDArray[Any], down: float) -> NDArray[Any]:
 
 #: One metre in every direction, around the origin.
 BOX = _box_shape()
-#: Of one metre in diameter, around the origin.
+#: One metre in diameter, around the origin.
 SPHERE = _sphere_shape()
-#: Of one metre in diameter and height, around the origin, along z.
+#: One metre in diameter and height, around the origin, along z.
 CYLINDER = _turned(
     [
         (0, -0.5, 0, -1),
@@ -206,7 +206,7 @@ CYLINDER = _turned(
     uv=lambda turns, z: _places(0.75 - turns, z + 0.5),
 )
 _SLOPE = math.hypot(1, 0.5)
-#: Of one metre in diameter and height, from z = 0 to its tip at z = 1.
+#: One metre in diameter and height, from z = 0 to its tip at z = 1.
 CONE = _turned(
     [
         (0, 0, 0, -1),

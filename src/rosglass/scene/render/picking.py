@@ -1,6 +1,7 @@
-"""What is under a pixel, or in a rectangle: computed from the drawables, without the GPU.
+"""Finds drawables under a pixel or in a rectangle, without the GPU.
 
-The answer is there at once, on every graphics interface; 200,000 points take a few milliseconds.
+The answer is available at once, on every graphics interface; 200,000 points take a few
+milliseconds.
 """
 
 from __future__ import annotations
@@ -30,12 +31,12 @@ _Place = tuple[float, float]
 
 
 class Hit(NamedTuple):
-    """What was found.
+    """A found point, line or instance.
 
     Attributes:
         drawable: The drawable; its `owner` is the display or part of one.
-        number: Number of the point, line or instance.
-        point: Where it was hit, in the fixed frame, metres.
+        number: Index of the point, line or instance.
+        point: The hit point in the fixed frame, metres.
         distance: Metres from the camera.
     """
 
@@ -46,11 +47,11 @@ class Hit(NamedTuple):
 
 
 class Selected(NamedTuple):
-    """What of one drawable is in a rectangle.
+    """The part of one drawable that is in a rectangle.
 
     Attributes:
         drawable: The drawable.
-        indices: Numbers of its points, lines or instances.
+        indices: Indices of its points, lines or instances.
     """
 
     drawable: Drawable
@@ -60,11 +61,11 @@ class Selected(NamedTuple):
 def pick(
     drawables: Iterable[_Placed], camera: Camera, x: float, y: float, radius: float = 2.0
 ) -> Hit | None:
-    """Return what is nearest to the camera under a place of the picture.
+    """Return the hit nearest to the camera under a point of the image.
 
     Args:
         drawables: From :meth:`rosglass.scene.render.scene_tree.Group.drawables`.
-        camera: The camera of the picture.
+        camera: The camera of the image.
         x: Units of the item, from its left edge.
         y: The same, from its upper edge.
         radius: How far from there points and lines may be, beside their own size.
@@ -98,13 +99,13 @@ def pick(
 def select(
     drawables: Iterable[_Placed], camera: Camera, corner: _Place, opposite: _Place
 ) -> Iterator[Selected]:
-    """Iterate over what is in a rectangle, hidden or not; of meshes, the middle counts.
+    """Iterate over everything in a rectangle, hidden or not; meshes count by their middle.
 
     Args:
         drawables: From :meth:`rosglass.scene.render.scene_tree.Group.drawables`.
-        camera: The camera of the picture.
+        camera: The camera of the image.
         corner: x and y, units of the item, from its left and upper edge.
-        opposite: The corner across.
+        opposite: The opposite corner.
     """
     (left, right), (top, bottom) = (sorted(pair) for pair in zip(corner, opposite, strict=True))
     for drawable, pose, alpha in drawables:

@@ -125,7 +125,7 @@ class ColorTransformer:
 
     @classmethod
     def supports(cls, layout: CloudLayout) -> bool:  # noqa: ARG003 - for subclasses
-        """Whether it can color a cloud."""
+        """Return whether it can color a cloud."""
         return True
 
     def colors(self, cloud: Cloud, transform: Array | None = None) -> PointColors:
@@ -136,7 +136,7 @@ class ColorTransformer:
             transform: Pose of the cloud in the fixed frame, 4x4; None if it is the same frame.
 
         Raises:
-            ArgumentError: The transform is no matrix of finite numbers.
+            ArgumentError: The transform is not a matrix of finite numbers.
         """
         raise NotImplementedError
 
@@ -149,7 +149,7 @@ class FlatColor(ColorTransformer):
         color: The color; its alpha, if it has one, is not used.
 
     Raises:
-        ArgumentError: The color is none.
+        ArgumentError: The color is invalid.
     """
 
     color: Color = _WHITE
@@ -170,7 +170,7 @@ class Rgb8(ColorTransformer):
 
     @classmethod
     def supports(cls, layout: CloudLayout) -> bool:
-        """Whether the cloud has such a field of 4 bytes."""
+        """Return whether the cloud has such a field of 4 bytes."""
         field = cls._field(layout)
         return field is not None and field.is_packed_color
 
@@ -206,7 +206,7 @@ class RgbF32(ColorTransformer):
 
     @classmethod
     def supports(cls, layout: CloudLayout) -> bool:
-        """Whether the cloud has these fields."""
+        """Return whether the cloud has these fields."""
         fields = [layout.find(name) for name in "rgb"]
         return all(field is not None and field.datatype == FLOAT32 for field in fields)
 

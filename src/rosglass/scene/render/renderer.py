@@ -67,18 +67,18 @@ _MODES = {"flat": 0.0, "bgra": 1.0, "rainbow": 2.0, "gradient": 3.0, "axis": 4.0
 _INDEX_UINT32 = QRhiCommandBuffer.IndexFormat.IndexUInt32
 #: Bytes from one vertex to the next that every graphics interface takes.
 _MAX_STRIDE = 2048
-#: Seconds of a picture in which drawables are uploaded that are new; the others follow in the next.
+#: Seconds per frame for uploading new drawables; the others follow in the next frame.
 _UPLOAD_S = 0.03
 #: Largest width and height of an image of texts, in pixels.
 _MAX_TEXTS_PX = 4096
 
 
 class Frame(NamedTuple):
-    """What one picture shows.
+    """The content of one frame.
 
     Attributes:
         drawables: Drawable, pose in the fixed frame, opacity of its groups.
-        camera: From where.
+        camera: The camera.
         background: Behind everything; its alpha below 1 lets other items shine through.
         moving: Whether the camera is being moved, so that speed counts more than completeness.
     """
@@ -100,14 +100,14 @@ _SHAPE_LAYOUT = (
 
 
 class _Pass(NamedTuple):
-    """One picture that is being drawn.
+    """One frame that is being drawn.
 
     Attributes:
-        commands: Where drawing is recorded.
-        viewport: All of the target.
-        thin: Of points, only every `thin`-th is drawn.
-        depth: What x, y, z, 1 from the renderer's origin are multiplied with to get the depth.
-        pixels: Of what is 1 m high at a depth of 1.
+        commands: The buffer that records drawing commands.
+        viewport: The whole target.
+        thin: Only every `thin`-th point is drawn.
+        depth: Factors of x, y, z, 1 from the renderer's origin whose sum is the depth.
+        pixels: Pixels per metre at a depth of 1.
     """
 
     commands: QRhiCommandBuffer
@@ -127,7 +127,7 @@ class _OnDevice:
         self._placed: Any = None
         self.seen = True
         self.bound: Any = None
-        #: What of it is not drawn, in words.
+        #: The parts of it that are not drawn, in words.
         self.problem = ""
 
     def prepare(
@@ -213,13 +213,13 @@ class _PointsOnDevice(_OnDevice):
         block[4] = paint.axis
 
     def _has_sprites(self) -> bool:
-        """Whether small squares are points of the graphics interface, as the processor draws."""
+        """Return whether small squares are drawn as points of the graphics interface (by CPU)."""
         device = self.device
         is_square = self.drawable.style in ("squares", "flat squares")
         return is_square and device.is_software and device.has_point_size
 
     def _has_large(self, run: _Pass) -> bool:
-        """Whether squares may be too large for sprites, by the nearest corner of their box."""
+        """Return whether squares may be too large for sprites, at the box's nearest corner."""
         points = self.drawable
         box = points.bounds()
         if box is None:
@@ -465,7 +465,7 @@ class _LabelsOnDevice(_OnDevice):
                 pixels = self._image.pixels
                 try:
                     self._texture = device.texture(batch, pixels, self._texture, (top, bottom))
-                except MemoryError:  # it is painted and tried again with the next picture
+                except MemoryError:  # it is painted and tried again with the next frame
                     self._image = TextImage(self._image.limit)
                     raise
                 self.bind((self._texture, device.smooth))
@@ -539,7 +539,7 @@ class _LabelsPart(NamedTuple):
 
     @property
     def drawable(self) -> Labels:
-        """What they are part of."""
+        """The drawable that they are part of."""
         drawable: Labels = self.labels.drawable
         return drawable
 
@@ -578,11 +578,11 @@ class SceneRenderer(QQuickRhiItemRenderer):
         self._takes_late = False
         #: Why there is no newer frame than the last one.
         self._failure = ""
-        #: How many pictures were drawn.
+        #: Number of drawn frames.
         self.count = 0
-        #: Whether the last picture shows all; otherwise, the next ones upload the rest.
+        #: Whether the last frame shows everything; otherwise, the next ones upload the rest.
         self.is_complete = True
-        #: Seconds that drawing the last picture took.
+        #: Seconds that drawing the last frame took.
         self._drawn_s = 0.0
 
     def initialize(self, commands: QRhiCommandBuffer) -> None:  # noqa: ARG002 - Qt's signature
@@ -603,7 +603,7 @@ class SceneRenderer(QQuickRhiItemRenderer):
 
     @property
     def draws_in_software(self) -> bool:
-        """Whether the processor draws; False before the first picture."""
+        """True if the CPU draws; False before the first frame."""
         return self._device is not None and self._device.is_software
 
     def draw_again(self) -> None:
@@ -693,7 +693,7 @@ class SceneRenderer(QQuickRhiItemRenderer):
         for one in self._on_device.values():
             one.seen = False
         self.is_complete = True
-        # As long as drawing takes: with many drawables, there would be too many pictures else.
+        # As long as drawing takes: otherwise many drawables would need too many frames.
         left_s = max(_UPLOAD_S, self._drawn_s)
         for number in self._in_order_of_upload(frame):
             drawable, pose, alpha = frame.drawables[number]

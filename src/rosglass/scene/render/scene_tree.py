@@ -36,7 +36,7 @@ class Item:
 
     @property
     def visible(self) -> bool:
-        """Whether it is drawn, as far as its groups are."""
+        """True if it is drawn whenever its groups are."""
         return self._visible
 
     @visible.setter
@@ -60,12 +60,12 @@ class Item:
             self.touch()
 
     def touch(self) -> None:
-        """Request a new picture from every scene that this item is in."""
+        """Request a new frame from every scene that this item is in."""
         item: Item | None = self
         while item is not None:
             if item.parent is None and isinstance(item, Group) and item.on_change is not None:
                 item.on_change()
-            # What is hidden changes no picture; hiding itself does.
+            # Hidden items do not change the frame; hiding one does.
             if not item._visible and item is not self:
                 return
             item = item.parent
@@ -77,7 +77,7 @@ class Item:
 
 
 def move_items(items: Sequence[Item], poses: NDArray[np.float64]) -> None:
-    """Move items of one group, and request one new picture for all of them.
+    """Move items of one group, and request one new frame for all of them.
 
     Args:
         items: The items.
@@ -211,7 +211,7 @@ class Drawable(Item):
 
     @property
     def opaque(self) -> bool:
-        """Whether nothing behind it shines through."""
+        """True if nothing behind it shines through."""
         return True
 
     def bounds(self) -> Box | None:
@@ -221,5 +221,5 @@ class Drawable(Item):
         return self._box
 
     def _find_bounds(self) -> Box | None:
-        """Compute the box, once for all pictures until the data changes."""
+        """Compute the box, once for all frames until the data changes."""
         raise NotImplementedError

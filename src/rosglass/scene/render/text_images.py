@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-# Not their classes: PySide prepares each when it is named, in 3 ms; first pictures have no text.
+# Not their classes: PySide prepares each when it is named, in 3 ms; first frames have no text.
 from rosglass.qt import QtCore, QtGui
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class TextImage:
         self.pixels: NDArray[np.uint8] = np.zeros((0, 0), np.uint8)
         #: Left, top, width and height of each text in pixels; the size is 0 if it has no room.
         self._boxes: dict[_Text, _Box] = {}
-        #: Where the next text goes: x, y, and the height of what is in this row of texts.
+        #: The position of the next text, x and y, and the height of this row of texts.
         self._free = (0, 0, 0)
         self._left_out = False
         self._font = QtGui.QFont("DejaVu Sans")
