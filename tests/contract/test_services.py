@@ -210,7 +210,7 @@ def test_requests_come_in_the_order_of_the_calls(robot, ordered_client, topic, w
 def test_a_server_that_ends_takes_its_calls_along_and_the_next_one_is_called(
     robot, client, ordered_client, topic, wire, kept, eventually, monkeypatch
 ):
-    monkeypatch.setattr("rosglass.ros2.rmw_services._GRACE_S", 0.1)  # 3 s, for a router's restart
+    monkeypatch.setattr("rosglass.comm.service_client._GRACE_S", 0.1)  # 3 s, for a router's restart
     used, begun = ordered_client if kept else client, threading.Event()
     server = robot.create_service_server(topic, wire.add, lambda _: begun.set() or Future())
     call = used.call_async(timeout=30)
@@ -224,6 +224,20 @@ def test_a_server_that_ends_takes_its_calls_along_and_the_next_one_is_called(
     assert not used.ready
     robot.create_service_server(topic, wire.add, lambda _: {"sum": 9})
     assert used.call(timeout=30).sum == 9
+
+
+def test_server_only_limits_the_wait_for_a_server_alone(robot, client, topic, wire):
+    with pytest.raises(rosglass.ServiceUnavailableError, match="nothing was sent"):
+        client.call_async(timeout=0.1, server_only=True).result(30)
+    answer = Future()
+    robot.create_service_server(topic, wire.add, lambda _: answer)
+    assert client.wait_for_server(30)
+    held = client.call_async(timeout=0.1, server_only=True)
+    with pytest.raises(rosglass.TimeoutError):
+        client.call_async(timeout=0.3).result(30)
+    assert not held.done()
+    answer.set_result({"sum": 3})
+    assert held.result(30).sum == 3
 
 
 def test_calls_from_many_threads(offer, client):

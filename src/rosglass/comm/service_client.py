@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import logging
+import math
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
 __all__ = ["PendingCalls", "ServiceClient", "ServiceRequester"]
 
 _log = logging.getLogger("rosglass.comm")
+#: Seconds that a server may be missing before its calls end: restarting a router of Zenoh hides
+#: all nodes for one or two.
+_GRACE_S = 3.0
 
 
 class PendingCalls:
@@ -185,6 +189,8 @@ class ServiceClient(Client):
         #: Every use is atomic.
         self._waiters: list[None] = []
         self._calls = PendingCalls()
+        #: Monotonic time at which a server was last available.
+        self._ready_at = -math.inf
         self._requester = create_requester(self._calls, self._on_change)
         self._requester.waiters = self._waiters
         core.add(self, self._follow)
@@ -230,8 +236,18 @@ class ServiceClient(Client):
         self._readiness.update()
 
     def _follow(self, moved: bool, idle: bool) -> None:
-        if not self._closed:
-            self._requester.follow(moved, idle)
+        if self._closed:
+            return
+        self._requester.follow(moved, idle)
+        now = time.monotonic()
+        if self._is_ready():
+            self._ready_at = now
+        for pending in self._calls:
+            if pending.lost_at is not None:
+                if now - pending.lost_at >= _GRACE_S:
+                    pending.call.set_exception(self._loss_error(pending))
+            elif pending.deadline is not None and now >= pending.deadline:
+                self._expire(pending)
 
     # -- calling ---------------------------------------------------------------------------------
 
@@ -277,14 +293,19 @@ class ServiceClient(Client):
                     return pending.call.result(timeout)
                 except TimeoutError:
                     # Raised by the call, or by the wait for it; in the latter case it ends here.
-                    self._expire(pending, timeout)
+                    self._expire(pending)
             return pending.call.result()
         except BaseException:
             pending.call.cancel()  # Ctrl-C
             raise
 
     def call_async(
-        self, request: Message | dict[str, Any] | None = None, /, *, timeout: float | None = 10.0
+        self,
+        request: Message | dict[str, Any] | None = None,
+        /,
+        *,
+        timeout: float | None = 10.0,
+        server_only: bool = False,
     ) -> Call:
         """Call the service without waiting; return the promise of the response.
 
@@ -294,18 +315,26 @@ class ServiceClient(Client):
 
         Arguments and errors as in :meth:`call`. A ConversionError is raised immediately, unless the
         type is not known yet.
+
+        Args:
+            request: As in :meth:`call`.
+            timeout: As in :meth:`call`.
+            server_only: True to wait for the response without limit while there is a server: after
+                `timeout`, the call only ends if none is available, or none has been for 3 s.
         """
         timeout = check_timeout(timeout, self.name)
-        pending = self._enter(request, timeout, private=False)
+        pending = self._enter(request, timeout, private=False, server_only=server_only)
         if timeout is not None:
-            limit = timeout
-            pending.timer = self._core.timers.after(limit, lambda: self._expire(pending, limit))
+            pending.timer = self._core.timers.after(timeout, lambda: self._expire(pending))
         self._requester.send(pending)
         return pending.call
 
-    def _enter(self, value: Any, timeout: float | None, *, private: bool) -> PendingCall:
+    def _enter(
+        self, value: Any, timeout: float | None, *, private: bool, server_only: bool = False
+    ) -> PendingCall:
         """Register and return a new pending call; raises ConversionError."""
         self._check_open()
+        now = time.monotonic()
         kind, max_size = self.type, self._requester.max_request
         # Encoded or copied now: the caller may change it while the call waits for a server.
         taken = (
@@ -323,7 +352,9 @@ class ServiceClient(Client):
             value=taken,
             type=kind,
             max_size=max_size,
-            deadline=None if timeout is None else time.monotonic() + timeout,
+            made=now,
+            deadline=None if timeout is None else now + timeout,
+            server_only=server_only,
             private=private,
         )
         self._calls.add(pending)
@@ -347,10 +378,13 @@ class ServiceClient(Client):
         self._calls.remove(pending)
         self._requester.forget(pending)
 
-    def _expire(self, pending: PendingCall, timeout: float) -> None:
-        """End a call at its deadline."""
-        if pending.call.done():
+    def _expire(self, pending: PendingCall) -> None:
+        """End a call whose deadline has passed."""
+        now = time.monotonic()
+        served = self._is_ready() or now - self._ready_at < _GRACE_S
+        if pending.call.done() or (pending.server_only and served):
             return
+        timeout = 0.0 if pending.deadline is None else pending.deadline - pending.made
         error: Error
         if pending.sent is None:
             error = ServiceUnavailableError(
@@ -358,7 +392,7 @@ class ServiceClient(Client):
                 f"{self.problem or self._requester.delay(pending)}; nothing was sent"
             )
         else:
-            since = time.monotonic() - pending.sent
+            since = now - pending.sent
             error = TimeoutError(
                 f"{self.name} did not answer within {timeout:g} s: "
                 f"{self._requester.server_name()} was sent the request {since:.1f} s ago, and may "
@@ -412,6 +446,11 @@ class ServiceClient(Client):
             f"({self._core.url}: {self._core.status()})"
         )
 
+    def end_calls(self, error: Error) -> None:
+        """End all pending calls with an error; servers are not notified."""
+        for each in self._calls:
+            each.call.set_exception(error)
+
     def close(self) -> None:
         """Close the client; pending calls end with NodeClosedError. Safe to call twice."""
         if self._closed:
@@ -419,10 +458,7 @@ class ServiceClient(Client):
         self._closed = True
         if self._core.forked:
             return
-        for each in self._calls:
-            each.call.set_exception(
-                NodeClosedError(f"the client of {self.name} was closed during a call")
-            )
+        self.end_calls(NodeClosedError(f"the client of {self.name} was closed during a call"))
         self._requester.close()
         self._readiness.close()
         self._core.remove(self)

@@ -182,9 +182,10 @@ class PendingCall:
         value: The encoded request, or the value to encode while the type is unknown.
         type: The type it is encoded for; None while that is unknown.
         max_size: Largest size of a request in bytes; None for no limit.
-        deadline: Monotonic time at which it ends without response; None for no limit.
-        private: Whether the caller waits in :meth:`ServiceClient.call`: its end runs no callback.
         made: Monotonic time of the call.
+        deadline: Monotonic time at which it ends without response; None for no limit.
+        server_only: True if it ends at its deadline, or after it, only while there is no server.
+        private: Whether the caller waits in :meth:`ServiceClient.call`: its end runs no callback.
         timer: Ends it at its deadline; None in :meth:`ServiceClient.call`, which does so itself.
         waiting: Whether its request waits to be sent; see :class:`PendingCalls`.
         sent: Monotonic time at which its request was sent, None before.
@@ -201,9 +202,10 @@ class PendingCall:
     value: Any
     type: ServiceType | None
     max_size: int | None
+    made: float
     deadline: float | None
+    server_only: bool
     private: bool
-    made: float = field(default_factory=time.monotonic)
     timer: Handle | None = None
     waiting: bool = False
     sent: float | None = None
@@ -214,8 +216,10 @@ class PendingCall:
     route: Any = None
 
     def left(self) -> float | None:
-        """Return the seconds until the deadline, above 0; None for no limit."""
-        return None if self.deadline is None else max(0.001, self.deadline - time.monotonic())
+        """Return the seconds until its response is useless, above 0; None for no limit."""
+        if self.deadline is None or self.server_only:
+            return None
+        return max(0.001, self.deadline - time.monotonic())
 
     def answer(self, data: bytes | memoryview) -> None:
         """End the call with its response, with its encapsulation header; on any thread."""

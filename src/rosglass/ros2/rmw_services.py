@@ -55,9 +55,6 @@ __all__ = [
 ]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Seconds that a server may be missing from the graph before its calls end: restarting a router
-#: hides all nodes for one or two.
-_GRACE_S = 3.0
 #: Poll interval in seconds of a server that is in the graph but not linked yet.
 _RETRY_S = 0.05
 
@@ -332,7 +329,7 @@ class Ros2Requester(ServiceRequester):
                 self._failure = str(error)
         self._on_change()
         self._flush()
-        self._end_lost_calls()
+        self._find_lost_calls()
 
     def _adopt(self, *, retry: bool) -> bool:
         """Adopt the type that servers announce; return whether it has changed."""
@@ -368,22 +365,18 @@ class Ros2Requester(ServiceRequester):
                 if pending.requester is old:
                     pending.fail(SERVER_LEFT)
 
-    def _end_lost_calls(self) -> None:
-        """End the calls whose servers have been missing for :data:`_GRACE_S`."""
+    def _find_lost_calls(self) -> None:
+        """Note since when the servers of sent requests are missing."""
         now = time.monotonic()
         for pending in self._calls:
-            requester = pending.requester
-            if requester is None:
+            if pending.requester is None:
                 continue
             if not pending.servers:
                 pending.servers = self.server_ids()
-            if not self._is_lost(pending, requester):
+            if not self._is_lost(pending, pending.requester):
                 pending.lost_at = None
             elif pending.lost_at is None:
                 pending.lost_at = now
-            elif now - pending.lost_at >= _GRACE_S:
-                pending.fail(SERVER_LEFT)
-                requester.forget(pending)
 
     def has_left(self, pending: PendingCall) -> bool:
         """Return whether the servers that a request was sent to have left the graph."""

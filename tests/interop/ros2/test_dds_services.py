@@ -297,7 +297,7 @@ def test_servers_that_exclude_each_other_are_named(start_services, node, types):
 @pytest.fixture
 def impatient(monkeypatch):
     """Give servers that left a tenth of a second to answer all the same."""
-    monkeypatch.setattr("rosglass.ros2.rmw_services._GRACE_S", 0.1)
+    monkeypatch.setattr("rosglass.comm.service_client._GRACE_S", 0.1)
 
 
 def cut_off(server: Any, until: Any) -> None:

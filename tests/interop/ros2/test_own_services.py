@@ -98,7 +98,7 @@ def test_the_other_way_round(node, url, run_peer):
 def test_a_server_that_is_killed_at_work(new_url, run_peer, monkeypatch):
     """Its calls and goals end soon, with an error, and the client is ready for the next server."""
     # Usually some seconds, in which a router may be restarted.
-    monkeypatch.setattr("rosglass.ros2.rmw_services._GRACE_S", 0.5)
+    monkeypatch.setattr("rosglass.comm.service_client._GRACE_S", 0.5)
     monkeypatch.setattr("rosglass.ros2.action_client.GRACE_S", 0.7)
     monkeypatch.setattr("rosglass.ros2.action_client.OUTAGE_S", 0.9)
     url = new_url()

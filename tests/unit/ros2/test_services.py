@@ -282,7 +282,7 @@ def test_an_empty_response_is_taken_in_every_shape(node, middleware):
 
 
 def test_calls_end_soon_when_their_server_is_gone(client, requester, middleware, monkeypatch):
-    monkeypatch.setattr("rosglass.ros2.rmw_services._GRACE_S", 0.05)
+    monkeypatch.setattr("rosglass.comm.service_client._GRACE_S", 0.05)
     requester.linked = True
     key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
     call = client.call_async(timeout=60)
@@ -292,6 +292,42 @@ def test_calls_end_soon_when_their_server_is_gone(client, requester, middleware,
     )
     with pytest.raises(rosglass.ConnectionLostError, match=reason):
         call.result(30)
+
+
+def test_server_only_ends_a_call_without_server_and_no_other(
+    client, requester, monkeypatch, eventually
+):
+    with pytest.raises(rosglass.ServiceUnavailableError, match=r"within 0\.3 s: no server offers"):
+        client.call_async(timeout=0.3, server_only=True).result(30)
+    requester.linked = True
+    eventually(lambda: client.ready)
+    calls = [client.call_async(timeout=0.05, server_only=True) for _ in range(10)]
+    assert client.call_async(timeout=0.1).exception(30) is not None  # all are over their limit now
+    assert requester.timeouts == [None] * 8
+    assert not any(call.done() for call in calls)
+    requester.reply(1, answer())
+    assert calls[0].result(30).sum == 3
+    eventually(lambda: len(requester.sent) == 9)
+    monkeypatch.setattr("rosglass.comm.service_client._GRACE_S", 0.05)
+    requester.linked = False
+    assert isinstance(calls[9].exception(30), rosglass.ServiceUnavailableError)
+    with pytest.raises(rosglass.TimeoutError, match="may still carry it out"):
+        calls[1].result(30)
+    eventually(lambda: client.pending == 0)
+
+
+def test_server_only_keeps_waiting_while_a_server_is_away_for_a_moment(client, requester):
+    requester.linked = True
+    sent = client.call_async(timeout=0.0, server_only=True)
+    client._follow(True, False)
+    requester.linked = False  # as a restarted router hides all nodes
+    waiting = client.call_async(timeout=0.0, server_only=True)
+    client._follow(True, False)
+    assert not sent.done()
+    assert not waiting.done()
+    requester.linked = True
+    client._follow(True, False)
+    assert len(requester.sent) == 2
 
 
 def test_a_server_that_comes_back_soon_keeps_its_calls(client, requester, middleware, eventually):
@@ -315,7 +351,7 @@ def test_a_server_that_comes_back_soon_keeps_its_calls(client, requester, middle
 def test_calls_end_when_their_server_was_away_and_is_back(
     client, requester, middleware, monkeypatch
 ):
-    monkeypatch.setattr("rosglass.ros2.rmw_services._GRACE_S", 0.05)
+    monkeypatch.setattr("rosglass.comm.service_client._GRACE_S", 0.05)
     requester.linked = True
     middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
     calls = [client.call_async(timeout=None) for _ in range(2)]
@@ -327,7 +363,7 @@ def test_calls_end_when_their_server_was_away_and_is_back(
 
 
 def test_patient_calls_wait_for_their_server_to_be_back(node, middleware, monkeypatch):
-    monkeypatch.setattr("rosglass.ros2.rmw_services._GRACE_S", 0.05)
+    monkeypatch.setattr("rosglass.comm.service_client._GRACE_S", 0.05)
     client = ActionServiceClient(core_of(node), "/add", ADD, waits_for_reconnect=True)
     (requester,) = middleware.requesters
     key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)

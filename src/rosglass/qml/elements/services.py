@@ -45,17 +45,13 @@ if TYPE_CHECKING:
 
 __all__ = ["RosServiceServer", "Service", "ServiceClient", "ServiceServer", "server_function"]
 
-#: Seconds after the loss of a server during which the client itself reports failed requests.
-_GRACE_S = 4.0
-
 
 @dataclass(eq=False)
 class _Request:
-    """A request without a reply."""
+    """A request that cannot be converted yet, as there is no client, or its type is unknown."""
 
     value: QJSValue
     done: Done
-    call: Call | None = None
     #: Time of creation, monotonic.
     made: float = field(default_factory=time.monotonic)
 
@@ -89,9 +85,8 @@ class ServiceClient(ClientElement):
     ) -> None:
         super().__init__(runtime, name, type_name, dialect)
         self._qos = qos
-        self._requests: list[_Request] = []
-        #: Time at which the server was lost, monotonic.
-        self._lost = 0.0
+        #: The requests that are no calls of the client yet.
+        self._early: list[_Request] = []
 
     @property
     def label(self) -> str:
@@ -161,69 +156,65 @@ class ServiceClient(ClientElement):
         Returns:
             Whether the request was accepted; otherwise `done` is not called.
         """
-        request = _Request(value, done)
-        self._requests.append(request)
-        report(self, pendingRequests=len(self._requests))
-        if self._endpoint is not None and self._endpoint.type is not None:
-            self._submit(request, running=True)
-        if request not in self._requests:
+        self._submit_waiting()
+        request, client = _Request(value, done), self._endpoint
+        if client is None or client.type is None:
+            self._early.append(request)
+            self._count()
+            if self.connectionTimeout:
+                QtCore.QTimer.singleShot(self.connectionTimeout, lambda: self._give_up(request))
+            return True
+        try:
+            self._submit(client, request)
+        except Error as error:
+            if self._runtime is not None:
+                self._runtime.throw(self._dialect.spelled(f"service {self._name}: {error}"))
             return False
-        if self.connectionTimeout and not self.ready:
-            QtCore.QTimer.singleShot(self.connectionTimeout, lambda: self._give_up(request))
         return True
 
-    def _submit(self, request: _Request, *, running: bool = False) -> None:
-        """Send a request; `running`: the QML function that made it is still running."""
-        client, session = self._endpoint, self._session
-        assert client is not None
+    def _submit(self, client: Caller_, request: _Request) -> None:
+        """Make a request a call of the client; raises Error if it is invalid."""
         assert client.type is not None
-        assert session is not None
-        try:
-            fields = given_fields(request.value, client.type.request, self._dialect)
-            call = client.call_async(fields, timeout=None)
-        except Error as error:
-            self._end(request, error, notify=not running)
-            if running and self._runtime is not None:
-                self._runtime.throw(self._dialect.spelled(f"service {self._name}: {error}"))
-            return
-        request.call = call
-        call.on_done(lambda ended: self._answered(request, ended), session.executor)
+        fields = given_fields(request.value, client.type.request, self._dialect)
+        left = None
+        if self.connectionTimeout:
+            waited = time.monotonic() - request.made
+            left = max(0.0, round(self.connectionTimeout / 1000 - waited, 2))
+        call = client.call_async(fields, timeout=left, server_only=True)
+        self._count()
+        call.on_done(lambda ended: self._answered(request.done, ended), self._executor)
 
-    def _answered(self, request: _Request, call: Call) -> None:
-        if not is_alive(self) or request not in self._requests or call.cancelled():
+    def _answered(self, done: Done, call: Call) -> None:
+        if not is_alive(self):
             return
+        self._count()
         error = call.exception()
         if error is None:
-            self._end(request, call.result())
+            done(call.result())
         else:
-            self._end(request, error if isinstance(error, Error) else Error(str(error)))
+            done(error if isinstance(error, Error) else Error(str(error)))
 
     def _give_up(self, request: _Request) -> None:
-        """Fail a request for which no server has appeared."""
-        if not is_alive(self) or request not in self._requests or self.ready:
+        """Fail a request that still has no client, or no type."""
+        if not is_alive(self) or request not in self._early:
             return
         reason = self._problem or "is it running, and is its name right?"
-        seconds = self.connectionTimeout / 1000
-        self._end(
-            request,
-            ServiceUnavailableError(
-                f"{self._name}: no server appeared within {seconds:g} s: {reason}"
-            ),
-        )
-
-    def _end(self, request: _Request, result: Message | Error, *, notify: bool = True) -> None:
-        if request not in self._requests:
-            return
-        self._requests.remove(request)
-        if request.call is not None:
-            request.call.cancel()
-        report(self, pendingRequests=len(self._requests))
-        if notify:
-            request.done(result)
+        text = f"{self._name}: no server appeared within {self.connectionTimeout / 1000:g} s"
+        self._early.remove(request)
+        self._count()
+        request.done(ServiceUnavailableError(f"{text}: {reason}"))
 
     def _fail_all(self, error: Error) -> None:
-        for request in list(self._requests):
-            self._end(request, error)
+        if self._endpoint is not None:
+            self._endpoint.end_calls(error)
+        early, self._early = self._early, []
+        self._count()
+        for request in early:
+            request.done(error)
+
+    def _count(self) -> None:
+        sent = 0 if self._endpoint is None else self._endpoint.pending
+        report(self, pendingRequests=len(self._early) + sent)
 
     def shown(self, result: Message | Error) -> QJSValue:
         """Return the argument for a callback."""
@@ -242,27 +233,20 @@ class ServiceClient(ClientElement):
         return lambda: node.create_service_client(self._name, self._type or None, self._qos)
 
     def _submit_waiting(self) -> None:
-        if self._endpoint is None or self._endpoint.type is None:
-            return
-        for request in list(self._requests):
-            if request.call is None and request in self._requests:
-                self._submit(request)
+        client = self._endpoint
+        while client is not None and client.type is not None and self._early:
+            request = self._early.pop(0)
+            try:
+                self._submit(client, request)
+            except Error as error:
+                self._count()
+                request.done(error)
 
-    def _set_ready(self, ready: bool) -> None:
-        if self.ready and not ready:
-            self._lost = time.monotonic()
-        super()._set_ready(ready)
-
-    @Slot()
-    def _on_tick(self) -> None:
-        # The server that seemed to exist at the time of a request may have been dead; its successor
-        # must not receive outdated requests.
-        timeout_s, now = self.connectionTimeout / 1000, time.monotonic()
-        if not self.connectionTimeout or self.ready or now - self._lost < _GRACE_S:
-            return
-        for request in list(self._requests):
-            if now - request.made > timeout_s:
-                self._give_up(request)
+    def _close_endpoint(self) -> None:
+        # Closing the client, in the background, would end its calls with another reason.
+        if self._endpoint is not None:
+            self._endpoint.end_calls(Error(f"{self._name}: the node was shut down"))
+        super()._close_endpoint()
 
 
 #: Milliseconds that a call waits for a server; discovery of an existing one may take this long.
