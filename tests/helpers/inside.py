@@ -23,6 +23,11 @@ def queue_of(display: Any) -> Any:
     return display._queue
 
 
+def waiting_of(display: Any) -> Any:
+    """Return the messages of a display that wait for their transforms."""
+    return display._waiting
+
+
 def renderers_of(view: Any) -> list[Any]:
     """Return what draws a 3D view: one for each window that it is in."""
     return list(view._frames.renderers)

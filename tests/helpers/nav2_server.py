@@ -16,10 +16,10 @@ class Driver:
     def __init__(self, node: Any) -> None:
         self.goals: list[Any] = []
         self.server = node.create_action_server(
-            "/navigate_to_pose", "nav2_msgs/action/NavigateToPose", self._execute
+            "/navigate_to_pose", "nav2_msgs/action/NavigateToPose", self.execute
         )
 
-    def _execute(self, goal: Any) -> dict[str, Any]:
+    def execute(self, goal: Any) -> dict[str, Any]:
         self.goals.append(goal)
         number = len(self.goals)
         while not goal.is_cancel_requested:

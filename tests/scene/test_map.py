@@ -120,7 +120,8 @@ def test_updates_follow_the_topic_of_the_map(bench: SceneBench) -> None:
     assert display.load_settings(saved) == []
     display.topic = "/costmap"
     bench.wait(lambda: endpoint_of(display) is not None)
-    assert display._wanted()[1] == ("/costmap", "/costmap_updates")
+    updates = bench.robot.create_publisher("/costmap_updates", "map_msgs/OccupancyGridUpdate")
+    bench.wait(updates.subscription_count)
     kept = display.save_settings(saved)["Update Topic"]
     assert kept == {"Depth": 5, "Durability Policy": "Volatile", "Value": "/costmap_updates"}
     assert display.save_settings()["Update Topic"] == "/costmap_updates"

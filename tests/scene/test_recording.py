@@ -92,7 +92,7 @@ def test_frame_beyond_the_rate_does_not_count_as_dropped(
     bench: SceneBench, recorder: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rosglass.scene.app.window_recorder._MAX_RATE_HZ", 0.01)
-    monkeypatch.setattr(type(recorder._writer), "is_full", True)
+    monkeypatch.setattr("rosglass.images.video_writer.VideoWriter.is_full", True)
     recorder.start(bench.window)
     for _ in range(5):
         bench.picture()

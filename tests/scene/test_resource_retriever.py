@@ -257,10 +257,10 @@ class Robot:
         self.node, self.cockpit = rosglass.connect(url, "robot"), rosglass.connect(url, "cockpit")
         self.requests: list[tuple[str, str]] = []
         self.response: dict[str, Any] = {"status_code": 0, "error_reason": "no such file"}
-        self.server = self.node.create_service_server(service, kind, self._answer)
+        self.server = self.node.create_service_server(service, kind, self.answer)
         self.retriever = ResourceRetriever(self.cockpit)
 
-    def _answer(self, request: Any) -> dict[str, Any]:
+    def answer(self, request: Any) -> dict[str, Any]:
         self.requests.append((request.path, request.etag))
         return self.response
 
@@ -348,7 +348,7 @@ def test_a_robot_that_serves_files_later_is_asked_again(
         with pytest.raises(ResourceError, match=f"no node offers the service {SERVICE}; it is"):
             robot.retriever.find(uri)
     assert robot.retriever.ask_again() == []
-    robot.node.create_service_server(SERVICE, TYPE, robot._answer)
+    robot.node.create_service_server(SERVICE, TYPE, robot.answer)
     # The first one is not there, but the robot answers.
     monkeypatch.setattr(resource_retriever, "_APPEAR_TIMEOUT_S", 10.0)
     assert robot.retriever.ask_again() == uris

@@ -893,7 +893,6 @@ def test_nothing_that_is_on_its_way_is_shown_after_a_change(bench: SceneBench, c
     else:
         path.enabled = False
         path.enabled = True
-    path._on_items()
     bench.wait.nothing_happens(0.2)
     assert path.received == 0
     assert not list(path.root)

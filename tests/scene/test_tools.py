@@ -628,7 +628,7 @@ def test_a_goal_of_an_action_is_canceled(bench: SceneBench, hand: Hand, nav2: An
     # A server may refuse.
     driver.server.close()
     nav2.create_action_server(
-        "/navigate_to_pose", "nav2_msgs/action/NavigateToPose", driver._execute,
+        "/navigate_to_pose", "nav2_msgs/action/NavigateToPose", driver.execute,
         cancel=lambda _: False,
     )  # fmt: skip
     bench.wait(lambda: endpoint_of(goal).ready)
@@ -710,7 +710,7 @@ def test_qml_does_not_silently_destroy_a_tool_with_a_goal(
     driver = Driver(nav2)
     for tool in (drive, later):
         view.tools.select(tool)
-        bench.wait(lambda tool=tool: tool._endpoint is not None)
+        bench.wait(lambda tool=tool: endpoint_of(tool) is not None)
         tool.send_pose(1.0, 2.0, 0.0)
     bench.wait(lambda: driver.goals)
     view.setProperty("wanted", False)
@@ -1194,7 +1194,7 @@ def test_a_goal_goes_to_the_topic_that_was_just_set(bench: SceneBench, nav2: Any
     after = listen(bench, "/robot2/goal_pose", "geometry_msgs/PoseStamped")
     view.tool = "SetGoal"
     goal = view.tools.current
-    bench.wait(lambda: goal._endpoint is not None and goal._endpoint.subscription_count())
+    bench.wait(lambda: (publisher := endpoint_of(goal)) and publisher.subscription_count())
     goal.topic = "/robot2/goal_pose"
     goal.send_pose(1.0, 2.0, 0.0)
     bench.wait(lambda: after)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from inside import endpoint_of, queue_of
+from inside import endpoint_of, queue_of, waiting_of
 
 from rosglass.scene.render.drawing import Lines, Mesh
 from rosglass.scene.render.mesh_shapes import CYLINDER, SPHERE
@@ -282,8 +282,8 @@ def test_bytes_of_what_waits_are_bounded(bench: SceneBench, monkeypatch: Any) ->
     bench.wait(publisher.subscription_count)
     cloud = {**CLOUD, "header": {"frame_id": "odom"}}
     publisher.publish(cloud)
-    bench.wait(lambda: display._waiting)
-    size = display._waiting[0].size
+    bench.wait(lambda: waiting_of(display))
+    size = waiting_of(display)[0].size
     assert 30 < size < 200
     # Never the newest one.
     for limit, kept in ((3 * size, 3), (size - 1, 1)):
@@ -291,11 +291,11 @@ def test_bytes_of_what_waits_are_bounded(bench: SceneBench, monkeypatch: Any) ->
             monkeypatch.setattr(module, "MAX_WAITING_BYTES", limit)
         for _ in range(5):
             publisher.publish(cloud)
-        bench.wait(lambda kept=kept: len(display._waiting) == kept)
+        bench.wait(lambda kept=kept: len(waiting_of(display)) == kept)
     bench.wait(lambda: display.received == 11)
     assert "while more than 100, or 0 MiB, waited for their transforms" in display.statusText
     # Nor do more of them wait for the GUI thread.
-    (queue, sample) = queue_of(display), display._waiting[-1]
+    (queue, sample) = queue_of(display), waiting_of(display)[-1]
     drained, _ = queue.drain()
     assert drained == []
     monkeypatch.setattr(queue, "_executor", type("", (), {"post": lambda *_: None})())
