@@ -80,7 +80,7 @@ def test_it_refuses_reports_and_ends_like_every_element(
     history = root.property("history")
     wait(chat.subscription_count)
     chat.publish(data="x")
-    wait(lambda: "/chat: data is no number" in history.property("problem"))
+    wait(lambda: "/chat: data is not a number" in history.property("problem"))
     chat.publish(data="2.5")
     wait(lambda: history.property("values") == [2.5])
     assert history.property("problem") == ""

@@ -722,7 +722,7 @@ def test_filters_do_not_take_long_whatever_the_names_are(robot: Robot) -> None:
     display.blacklist = "a("
     bench.wait(lambda: len(display.frames) == 6)
     text = display.status_lines["Filter (blacklist)"].text
-    assert text.startswith("this is no regular expression: ")
+    assert text.startswith("this is not a regular expression: ")
     assert text.endswith(", at letter 3")
     robot.check()
 

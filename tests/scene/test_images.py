@@ -188,7 +188,7 @@ def test_an_old_picture_fades_though_its_publisher_lives(
 
     robot.show(display, header=now())
     bench.wait(lambda: display.statusLevel == "warn")
-    assert "no new picture is shown" in display.statusText
+    assert "no new image is shown" in display.statusText
     robot.show(display, header=now())
     bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
 
@@ -390,7 +390,7 @@ def test_displays_can_be_hidden_in_the_camera(bench: SceneBench, camera: tuple[A
     ("fields", "text"),
     [
         ({"p": [float("nan"), *P[1:]]}, "CameraInfo/p: contains NaN or infinite numbers"),
-        ({"p": [*P[:3], 1e300, *P[4:]]}, "CameraInfo/p: 1e+300 is no number of pixels"),
+        ({"p": [*P[:3], 1e300, *P[4:]]}, "CameraInfo/p: 1e+300 is not a number of pixels"),
         ({"p": [0.0] * 12}, "expected focal lengths above 0 pixels, got fx 0 and fy 0"),
     ],
 )

@@ -769,8 +769,8 @@ def test_without_a_server_the_status_says_so(bench: SceneBench) -> None:
     [
         ({"scale": float("nan")}, "scale nan"),
         ({"pose": {"orientation": {"w": float("inf")}}}, "is not finite"),
-        ({"controls": [control(77)]}, "control 'mode77': interaction_mode 77 is none"),
-        ({"controls": [control(3, orientation_mode=9)]}, "orientation_mode 9 is none"),
+        ({"controls": [control(77)]}, "control 'mode77': interaction_mode 77 is invalid"),
+        ({"controls": [control(3, orientation_mode=9)]}, "orientation_mode 9 is invalid"),
         ({"controls": []}, "it has no controls"),
         (
             {"controls": [control(2, boxes=True)], "menu_entries": [{"id": 7, "parent_id": 7}]},

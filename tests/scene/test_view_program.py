@@ -293,7 +293,7 @@ def test_invalid_move_raises(bench: SceneBench, grouped: Any) -> None:
     scene = bench.view.scene
     grid, group, axes, plan = scene.displays
     for before, into, why in (
-        (None, grid, "display 'Grid' is no group"),
+        (None, grid, "display 'Grid' is not a group"),
         (None, group, "display 'Robot' cannot be moved into itself"),
         (axes, None, ""),
         (plan, group, "display 'Plan' is not in display 'Robot'"),

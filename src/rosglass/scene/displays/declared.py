@@ -1,4 +1,4 @@
-"""What QML declares inside a ``SceneView``: it finds its view, or says that it is in none."""
+"""Elements that QML declares inside a ``SceneView``, with an error for those outside of one."""
 
 from __future__ import annotations
 

@@ -117,23 +117,23 @@ class Display(Configurable, TopicElement):
     ) -> None:
         self.root = Group()
         self.scene: Scene | None = None
-        #: Whether it was removed, and waits to be destroyed.
+        #: True once it was removed and waits to be destroyed.
         self._is_removed = False
         self.status_lines: dict[str, Status] = {}
         self._name = ""
-        #: What a ``.rviz`` file had for it.
+        #: The display's entry in a ``.rviz`` file.
         self.saved: dict[str, Any] = {}
         #: When a frame was found last, by the clock of :func:`time.monotonic`.
         self._placed_at = -math.inf
         #: Lines of the status whose error was logged.
         self._logged: set[str] = set()
-        #: Frames that it follows and that are not updated any more, and for how many seconds.
+        #: Followed frames that are no longer updated, and for how many seconds.
         self._outdated_frames: dict[str, float] = {}
-        #: What of it is shown and hidden one by one; None for nothing.
+        #: The parts that are shown and hidden one by one; None without any.
         self.parts: Parts | None = None
-        #: Parts that QML has switched before they were known, and where.
+        #: Parts that QML has switched before they were known, and the caller.
         self._switched_parts: dict[str, Caller] = {}
-        #: The group that it is in; None for none.
+        #: The group that it is in; None without one.
         self.group: Display | None = None
         super().__init__(parent, runtime)
         self._log_timer = single_shot(self, self._log_errors)
@@ -194,7 +194,7 @@ class Display(Configurable, TopicElement):
 
     @property
     def shown(self) -> bool:
-        """Whether it and its groups are enabled."""
+        """True while it and its groups are enabled."""
         return bool(self.enabled) and (self.group is None or self.group.shown)
 
     def _on_enabled(self) -> None:

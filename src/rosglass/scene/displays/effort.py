@@ -40,7 +40,7 @@ __all__ = ["EffortDisplay"]
 
 #: Milliseconds until a description that is not there is looked up again.
 _RETRY_MS = 2000
-#: Seconds between two pictures of messages that arrive faster.
+#: Seconds between two drawn messages if they arrive faster.
 _INTERVAL_S = 1 / 30
 #: Seconds for which efforts may wait for the transforms of their time before that is an error.
 _LATE_S = 1.0
@@ -76,11 +76,11 @@ class _Endpoint:
 
 
 class _Efforts(NamedTuple):
-    """What is drawn of one message.
+    """The drawn values of one message.
 
     Attributes:
         values: Effort and position in the message, by name of the joint.
-        poses: Of the joints in the fixed frame, with the axis along z; those that are known.
+        poses: Known poses of the joints in the fixed frame, with the axis along z.
     """
 
     values: dict[str, tuple[float, int]]
@@ -88,15 +88,15 @@ class _Efforts(NamedTuple):
 
 
 class _Owner:
-    """What a pick of arcs or their heads finds.
+    """The result of picking arcs or their heads.
 
     Attributes:
-        names: Of the joints, in the order in which they are drawn.
+        names: Names of the joints, in the order in which they are drawn.
 
     Args:
         display: The display.
         efforts: Nm, by name of the joint.
-        rows: What is drawn of each joint: lines of an arc, or one head.
+        rows: Drawn rows of each joint: lines of an arc, or one head.
     """
 
     def __init__(self, display: EffortDisplay, efforts: dict[str, float], rows: int) -> None:
@@ -182,20 +182,20 @@ class EffortDisplay(HistoryDisplay):
     IS_CONTINUOUS = True
 
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
-    width = Setting("Width", "float", 0.02, "Of the arcs, in metres.", min=0.0)
+    width = Setting("Width", "float", 0.02, "Line width of the arcs, in metres.", min=0.0)
     scale = Setting(
         "Scale", "float", 1.0, "Diameter of an arc at the joint's limit, in metres.", min=0.0
     )
     historyLength = Setting(
-        "History Length", "int", 1, "How many are shown.", min=1, max=100_000, then="_on_length"
+        "History Length", "int", 1, "Number of messages.", min=1, max=100_000, then="_on_length"
     )
     robotDescription = Setting(
         "Robot Description", "string", "robot_description",
-        "Of the description: the parameter's name in ROS 1, the topic's in ROS 2.",
+        "Name of the description's parameter (ROS 1) or topic (ROS 2).",
         then="_on_source",
     )  # fmt: skip
     tfPrefix = Setting(
-        "TF Prefix", "string", "", "In front of the names of links, with a slash.",
+        "TF Prefix", "string", "", "Prefix of the links' frames, joined by a slash.",
         then="_on_prefix",
     )  # fmt: skip
 
@@ -212,7 +212,7 @@ class EffortDisplay(HistoryDisplay):
         self._text: str | None = None
         self._loader = DescriptionLoader(_joints_of, weak_callback(self._set_robot))
         self._urdf = Status("warn", "")
-        #: What :meth:`_place` has found for the message that :meth:`show` gets next.
+        #: The poses that :meth:`_place` has found for the next message of :meth:`show`.
         self._poses: dict[str, NDArray[np.float64]] = {}
         self._next_at = 0.0
         super().__init__(parent, runtime)

@@ -50,11 +50,11 @@ class PointStampedDisplay(HistoryDisplay):
     LENGTH = "History Length"
     MESSAGES = ("geometry_msgs/PointStamped",)
 
-    color = Setting("Color", "color", "#cc29cc", "Of the sphere.")
+    color = Setting("Color", "color", "#cc29cc", "Color of the sphere.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
-    radius = Setting("Radius", "float", 0.2, "In metres.", min=0.0)
+    radius = Setting("Radius", "float", 0.2, "Radius of the sphere, in metres.", min=0.0)
     historyLength = Setting(
-        "History Length", "int", 1, "How many are shown.", min=1, max=100_000, then="_on_length"
+        "History Length", "int", 1, "Number of messages.", min=1, max=100_000, then="_on_length"
     )
 
     def preparer(self) -> Callable[[Any], Any]:
@@ -75,7 +75,7 @@ class PolygonDisplay(HistoryDisplay):
     TYPE = "Polygon"
     MESSAGES = ("geometry_msgs/PolygonStamped",)
 
-    color = Setting("Color", "color", "#19ff00", "Of the outline.")
+    color = Setting("Color", "color", "#19ff00", "Color of the outline.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
 
     def preparer(self) -> Callable[[Any], Any]:
@@ -109,10 +109,10 @@ class RangeDisplay(HistoryDisplay):
     IS_CONTINUOUS = True
     MESSAGES = ("sensor_msgs/Range",)
 
-    color = Setting("Color", "color", "#ffffff", "Of the cone.")
+    color = Setting("Color", "color", "#ffffff", "Color of the cone.")
     alpha = Setting("Alpha", "float", 0.5, "Opacity.", min=0.0, max=1.0)
     bufferLength = Setting(
-        "Buffer Length", "int", 1, "How many are shown.", min=1, then="_on_length"
+        "Buffer Length", "int", 1, "Number of messages.", min=1, then="_on_length"
     )
 
     def preparer(self) -> Callable[[Any], Any]:
@@ -156,13 +156,13 @@ def _screw_settings() -> tuple[Setting, Setting, Setting, Setting]:
     """
     return (
         Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0),
-        Setting("Arrow Width", "float", 0.5, "In metres.", min=0.0),
+        Setting("Arrow Width", "float", 0.5, "Width of the arrows, in metres.", min=0.0),
         Setting(
-            "History Length", "int", 1, "How many are shown.", min=1, max=100_000, then="_on_length"
+            "History Length", "int", 1, "Number of messages.", min=1, max=100_000, then="_on_length"
         ),
         Setting(
             "Hide Small Values", "bool", True,
-            "Whether arrows shorter than their width are hidden.",
+            "Hide arrows that are shorter than their width.",
         ),
     )  # fmt: skip
 
@@ -234,10 +234,14 @@ class WrenchStampedDisplay(HistoryDisplay):
     MESSAGES = ("geometry_msgs/WrenchStamped",)
 
     alpha, arrowWidth, historyLength, hideSmallValues = _screw_settings()
-    forceColor = Setting("Force Color", "color", "#cc3333", "Of the force.")
-    torqueColor = Setting("Torque Color", "color", "#cccc33", "Of the torque.")
-    forceArrowScale = Setting("Force Arrow Scale", "float", 2.0, "Metres per newton.")
-    torqueArrowScale = Setting("Torque Arrow Scale", "float", 2.0, "Metres per newton metre.")
+    forceColor = Setting("Force Color", "color", "#cc3333", "Color of the force.")
+    torqueColor = Setting("Torque Color", "color", "#cccc33", "Color of the torque.")
+    forceArrowScale = Setting(
+        "Force Arrow Scale", "float", 2.0, "Arrow length in metres per newton."
+    )
+    torqueArrowScale = Setting(
+        "Torque Arrow Scale", "float", 2.0, "Arrow length in metres per newton metre."
+    )
 
     def preparer(self) -> Callable[[Any], Any]:
         """Return the function that reads both vectors."""
@@ -259,10 +263,14 @@ class TwistStampedDisplay(HistoryDisplay):
     MESSAGES = ("geometry_msgs/TwistStamped",)
 
     alpha, arrowWidth, historyLength, hideSmallValues = _screw_settings()
-    linearColor = Setting("Linear Color", "color", "#cc3333", "Of the linear part.")
-    angularColor = Setting("Angular Color", "color", "#cccc33", "Of the angular part.")
-    linearArrowScale = Setting("Linear Arrow Scale", "float", 2.0, "Metres per unit.")
-    angularArrowScale = Setting("Angular Arrow Scale", "float", 2.0, "Metres per unit.")
+    linearColor = Setting("Linear Color", "color", "#cc3333", "Color of the linear velocity.")
+    angularColor = Setting("Angular Color", "color", "#cccc33", "Color of the angular velocity.")
+    linearArrowScale = Setting(
+        "Linear Arrow Scale", "float", 2.0, "Arrow length in metres per m/s."
+    )
+    angularArrowScale = Setting(
+        "Angular Arrow Scale", "float", 2.0, "Arrow length in metres per rad/s."
+    )
 
     def preparer(self) -> Callable[[Any], Any]:
         """Return the function that reads both vectors."""
@@ -284,10 +292,16 @@ class AccelStampedDisplay(HistoryDisplay):
     MESSAGES = ("geometry_msgs/AccelStamped",)
 
     alpha, arrowWidth, historyLength, hideSmallValues = _screw_settings()
-    linearColor = Setting("Linear Color", "color", "#cc3333", "Of the linear part.")
-    angularColor = Setting("Angular Color", "color", "#cccc33", "Of the angular part.")
-    linearArrowScale = Setting("Linear Arrow Scale", "float", 2.0, "Metres per unit.")
-    angularArrowScale = Setting("Angular Arrow Scale", "float", 2.0, "Metres per unit.")
+    linearColor = Setting("Linear Color", "color", "#cc3333", "Color of the linear acceleration.")
+    angularColor = Setting(
+        "Angular Color", "color", "#cccc33", "Color of the angular acceleration."
+    )
+    linearArrowScale = Setting(
+        "Linear Arrow Scale", "float", 2.0, "Arrow length in metres per m/s²."
+    )
+    angularArrowScale = Setting(
+        "Angular Arrow Scale", "float", 2.0, "Arrow length in metres per rad/s²."
+    )
 
     def preparer(self) -> Callable[[Any], Any]:
         """Return the function that reads both vectors."""

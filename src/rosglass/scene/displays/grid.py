@@ -24,7 +24,7 @@ __all__ = ["AxesDisplay", "GridDisplay"]
 class _InFrame(Display):
     """A display that stays in one frame of the robot."""
 
-    frame = Setting("Reference Frame", "frame", FIXED_FRAME, "The frame that it is drawn in.")
+    frame = Setting("Reference Frame", "frame", FIXED_FRAME, "Frame in which it is drawn.")
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -58,23 +58,23 @@ class GridDisplay(_InFrame):
     TYPE = "Grid"
 
     planeCellCount = Setting(
-        "Plane Cell Count", "int", 10, "Cells in each direction.", min=1, max=10000
+        "Plane Cell Count", "int", 10, "Cells in each direction of the plane.", min=1, max=10000
     )
     normalCellCount = Setting(
-        "Normal Cell Count", "int", 0, "Cells across the plane.", min=0, max=1000
+        "Normal Cell Count", "int", 0, "Cells perpendicular to the plane.", min=0, max=1000
     )
-    cellSize = Setting("Cell Size", "float", 1.0, "Of a cell, in metres.", min=0.0001)
+    cellSize = Setting("Cell Size", "float", 1.0, "Side length of a cell, in metres.", min=0.0001)
     lineStyle = Setting(
         "Line Style", "enum", "Lines", "How lines are drawn.", choices=["Lines", "Billboards"]
     )
     lineWidth = Setting(
-        "Line Style/Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001,
+        "Line Style/Line Width", "float", 0.03, "Width of billboards, in metres.", min=0.001,
         shown_if={"lineStyle": "Billboards"},
     )  # fmt: skip
-    color = Setting("Color", "color", "#a0a0a4", "The colour.")
+    color = Setting("Color", "color", "#a0a0a4", "Color of the lines.")
     alpha = Setting("Alpha", "float", 0.5, "Opacity.", min=0.0, max=1.0)
-    plane = Setting("Plane", "enum", "XY", "The plane.", choices=["XY", "XZ", "YZ"])
-    offset = Setting("Offset", "vector", [0, 0, 0], "Of the middle, in metres.")
+    plane = Setting("Plane", "enum", "XY", "Plane of the grid.", choices=["XY", "XZ", "YZ"])
+    offset = Setting("Offset", "vector", [0, 0, 0], "Position of the grid's centre, in metres.")
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -121,8 +121,8 @@ class AxesDisplay(_InFrame):
 
     TYPE = "Axes"
 
-    length = Setting("Length", "float", 1.0, "Of an axis, in metres.", min=0.0001)
-    radius = Setting("Radius", "float", 0.1, "Of an axis, in metres.", min=0.0001)
+    length = Setting("Length", "float", 1.0, "Length of an axis, in metres.", min=0.0001)
+    radius = Setting("Radius", "float", 0.1, "Radius of an axis, in metres.", min=0.0001)
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
 
     def __init__(

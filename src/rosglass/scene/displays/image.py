@@ -1,7 +1,7 @@
-"""The displays Image and Camera: a camera's pictures, alone or with the scene in them.
+"""The displays Image and Camera: a camera's images, alone or with the scene in them.
 
 They are shown by ``ImagePanel`` (``panels/ImagePanel.qml``), whose items are here: a
-:class:`PictureItem` paints the pictures, a :class:`CameraView` draws the scene from the camera.
+:class:`PictureItem` paints the images, a :class:`CameraView` draws the scene from the camera.
 """
 # ruff: noqa: N815, N802 - the names of properties, signals and events are Qt's
 
@@ -60,58 +60,58 @@ __all__ = [
 ]
 
 _CAMERA_INFO = "sensor_msgs/CameraInfo"
-#: Seconds after which a picture is no longer live.
+#: Seconds after which an image is no longer live.
 _MAX_AGE_S = DEFAULT_TIMEOUT_MS / 1000
-#: Seconds for which a camera's pictures wait for their transform; then they are shown alone.
+#: Seconds for which a camera's images wait for their transform; then they are shown alone.
 _TRANSFORM_WAIT_S = 1.0
-#: Milliseconds until displays that a camera hides have to be there.
+#: Milliseconds until displays that a camera hides must exist.
 _HIDDEN_CHECK_MS = 1000
-#: Largest factor by which pictures are kept larger than a panel, for a zoom.
+#: Largest factor by which images are kept larger than a panel, for a zoom.
 _MOST_ZOOM = 8.0
-#: What numbers of a CameraInfo can be; beyond, places on the screen would not be finite.
+#: Limits of numbers in a CameraInfo; beyond them, positions on the screen would not be finite.
 _MIN_FOCAL_PIXELS, _MAX_PIXELS = 0.001, 1e9
 #: From a camera (x right, y down, looking along z) to OpenGL's (y up, looking along -z).
 _OPTICAL = np.diag([1.0, -1.0, -1.0, 1.0])
-#: The place of a panel in a view, in config files; RViz does not read it.
+#: Key of a panel's geometry in config files; RViz does not read it.
 _PANEL, _SIDES = "Panel Geometry", ("X", "Y", "Width", "Height")
 _NO_PANEL = "no panel shows it: declare ImagePanel { display: ... }"
 
 
 class PictureDisplay(Display):
-    """Base class of the displays of a camera's pictures, which several panels may show.
+    """Base class of the displays of a camera's images, which several panels may show.
 
-    It receives pictures while a panel shows it.
+    It receives images while a panel shows it.
     """
 
     MESSAGES = tuple(dict.fromkeys(ros1_name(one.type) for one in TRANSPORTS.values()))
 
-    #: Another picture is shown, at another place, or none any more.
+    #: The image, its position or its visibility has changed.
     pictureChanged = Signal()
 
     TOPIC_KEYS = ("Topic",)
     topic = Setting("Topic", "topic", "", "Topic to subscribe to.", then="_on_topic")
     depth = Setting(
-        "Topic/Depth", "int", 2, "Pictures kept until their transform is known.", min=1, max=100,
+        "Topic/Depth", "int", 2, "Images kept until their transform is known.", min=1, max=100,
         then="",
     )  # fmt: skip
     transport = Setting(
         "Transport Hint", "enum", "raw",
-        "How pictures are sent; in another way while they are not sent in this one.",
+        "Transport of the images; another one is used while this one is not published.",
         choices=list(TRANSPORTS), then="_schedule",
     )  # fmt: skip
 
-    #: How many pictures were received.
+    #: Number of received images.
     received = ReadOnly(int, 0)
-    #: Place and size of its panel in a view, units of the view; empty until the user moves it.
+    #: Position and size of its panel in units of the view; empty until the user moves it.
     panelGeometry = Writable(QtCore.QRectF, QtCore.QRectF(), then="")
-    #: Whether it, and the groups that it is in, are enabled.
+    #: True while it and its groups are enabled.
     active = ReadOnly(bool, False)
     isPicture = Property(bool, lambda _: True, constant=True)
-    #: Whether the scene is drawn in its picture.
+    #: True if the scene is drawn in its image.
     isCamera = Property(bool, lambda _: False, constant=True)
-    #: Whether the picture is behind the scene.
+    #: True if the image is behind the scene.
     behind = Property(bool, lambda self: self._is_behind(), notify=pictureChanged)
-    #: Opacity of the picture over the scene.
+    #: Opacity of the image over the scene.
     overlay = Property(float, lambda self: self._overlay_alpha(), notify=pictureChanged)
 
     _HOLDS = ("_picture",)
@@ -154,7 +154,7 @@ class PictureDisplay(Display):
     # -- panels ----------------------------------------------------------------------------------
 
     def add_sink(self, item: ImageItem) -> None:
-        """Show the pictures in an item as well."""
+        """Show the images in an item as well."""
         sink = Sink(item)
         self._sinks.append(sink)
         if self._picture is not None:
@@ -162,16 +162,16 @@ class PictureDisplay(Display):
         self._schedule()
 
     def remove_sink(self, item: ImageItem) -> None:
-        """Show no more pictures in an item."""
+        """Stop showing the images in an item."""
         self._sinks = [one for one in self._sinks if one.item is not item]
         self._schedule()
 
     def picture_place(self, width: float, height: float) -> QtCore.QRectF:
-        """Return where the picture is in an item; it may be larger than that.
+        """Return the image's rectangle in an item, which it may exceed.
 
         Args:
-            width: Of the item.
-            height: The same.
+            width: Width of the item.
+            height: Height of the item.
         """
         picture = self._picture
         aspect = 1.0 if picture is None else picture.frame.width / picture.frame.height
@@ -243,7 +243,7 @@ class PictureDisplay(Display):
         return 1.0
 
     def _look(self) -> Look:
-        """Return how pictures are converted: not larger than the largest panel shows them."""
+        """Return how images are converted: not larger than the largest panel shows them."""
         from rosglass.qml.elements.image_rendering import Look  # noqa: PLC0415 - loads QtMultimedia
 
         rooms = [sink.room() for sink in self._sinks if sink.is_alive]
@@ -264,18 +264,18 @@ class PictureDisplay(Display):
                 self._shown_look = look
                 stream.change_look(self, look)
 
-    # -- pictures --------------------------------------------------------------------------------
+    # -- images ----------------------------------------------------------------------------------
 
     def show_picture(self, picture: Picture) -> None:
-        """Take a picture; called by the stream in the GUI thread."""
+        """Receive an image; called by the stream in the GUI thread."""
         if not is_alive(self) or self.scene is None or not self.shown:
             return
         self._arrived = time.time()
         if self._outdated:
-            # Not by the last picture of a publisher that is gone.
+            # Not by the last image of a publisher that is gone.
             self._recheck_outdated()
         report(self, received=self.received + 1)
-        self.set_status("Topic", "ok", f"{self.received} pictures received")
+        self.set_status("Topic", "ok", f"{self.received} images received")
         self.delete_status("Image")
         self._take_picture(picture)
 
@@ -303,7 +303,7 @@ class PictureDisplay(Display):
         self._update_stale()
 
     def reset(self) -> None:
-        """Remove the picture."""
+        """Remove the image."""
         super().reset()
         self._picture = None
         for sink in self._sinks:
@@ -353,30 +353,30 @@ class PictureDisplay(Display):
             self.delete_status("Data")
             return
         when = time.strftime("%H:%M:%S", time.localtime(self._arrived))
-        why = "its publisher is gone" if self._outdated else "no new picture is shown"
+        why = "its publisher is gone" if self._outdated else "no new image is shown"
         self.set_status("Data", "warn", f"{why}; the last one is of {when}")
 
 
 class ImageDisplay(PictureDisplay):
-    """A camera's pictures. See its page in ``docs/scene.md``."""
+    """A camera's images. See its page in ``docs/scene.md``."""
 
     TYPE = "Image"
 
     normalizeRange = Setting(
         "Normalize Range", "bool", True,
-        "Whether black and white follow the pictures, for depths and other numbers.",
+        "Adapt black and white to the images, for depths and other numbers.",
         then="_update_range",
     )  # fmt: skip
     minValue = Setting(
-        "Min Value", "float", 0.0, "What is black, in the picture's numbers.",
+        "Min Value", "float", 0.0, "Value that is shown as black.",
         then="_update_range", shown_if={"normalizeRange": False},
     )  # fmt: skip
     maxValue = Setting(
-        "Max Value", "float", 1.0, "What is white, in the picture's numbers.",
+        "Max Value", "float", 1.0, "Value that is shown as white.",
         then="_update_range", shown_if={"normalizeRange": False},
     )  # fmt: skip
     medianWindow = Setting(
-        "Median window", "int", 5, "Pictures over which black and white are medians.",
+        "Median window", "int", 5, "Number of images for the medians of black and white.",
         min=1, max=1000, then="_update_range", shown_if={"normalizeRange": True},
     )  # fmt: skip
 
@@ -398,16 +398,16 @@ class ImageDisplay(PictureDisplay):
 
 
 class _Lens(NamedTuple):
-    """What a ``CameraInfo`` says of a camera whose pictures are rectified.
+    """The parameters of a camera with rectified images, from a ``CameraInfo``.
 
     Attributes:
-        width: Of the picture in pixels; 0 where the camera does not say.
-        height: The same.
+        width: Width of the image in pixels; 0 if the camera does not give it.
+        height: Height of the image in pixels; 0 if the camera does not give it.
         fx: Focal length in pixels, to the right.
         fy: The same, downwards.
-        cx: Where its axis is seen, pixels from the left.
-        cy: The same, from above.
-        right: Metres from its frame to the camera, of the right one of a stereo pair.
+        cx: Position of the optical axis, pixels from the left.
+        cy: The same, from the top.
+        right: Metres from its frame to the camera, for the right camera of a stereo pair.
         down: The same, downwards.
     """
 
@@ -432,35 +432,35 @@ def _read_lens(message: Any) -> _Lens:
     if not np.isfinite(numbers).all():
         raise Error(f"CameraInfo/{name}: contains NaN or infinite numbers: {numbers}")
     if max(map(abs, numbers)) > _MAX_PIXELS:
-        raise Error(f"CameraInfo/{name}: {max(numbers, key=abs):g} is no number of pixels")
+        raise Error(f"CameraInfo/{name}: {max(numbers, key=abs):g} is not a number of pixels")
     fx, _, cx, tx, _, fy, cy, ty = numbers[:8]
     if min(fx, fy) < _MIN_FOCAL_PIXELS:
         raise Error(
             f"CameraInfo/{name}: expected focal lengths above 0 pixels, got fx {fx:g} and fy "
             f"{fy:g}; calibrate the camera"
         )
-    # Pictures are of the region of interest; where they are binned, their pixels are larger.
+    # Images show the region of interest; the pixels of binned ones are larger.
     roi = message.roi
     size = (roi.width or message.width, roi.height or message.height)
     return _Lens(*size, fx, fy, cx - roi.x_offset, cy - roi.y_offset, -tx / fx, -ty / fy)
 
 
 class CameraDisplay(PictureDisplay):
-    """The scene as a camera of the robot sees it, with its picture. See ``docs/scene.md``."""
+    """The scene as a camera of the robot sees it, with its image. See ``docs/scene.md``."""
 
     TYPE = "Camera"
 
     imageRendering = Setting(
         "Image Rendering", "enum", "background and overlay",
-        "Whether the picture is behind the scene, over it, or both.",
+        "Show the image behind the scene, over it, or both.",
         choices=["background", "overlay", "background and overlay"], then="_emit_changed",
     )  # fmt: skip
     overlayAlpha = Setting(
-        "Overlay Alpha", "float", 0.5, "Opacity of the picture over the scene.", min=0.0, max=1.0,
+        "Overlay Alpha", "float", 0.5, "Opacity of the image over the scene.", min=0.0, max=1.0,
         then="_emit_changed", shown_if={"imageRendering": ("overlay", "background and overlay")},
     )  # fmt: skip
     zoomFactor = Setting(
-        "Zoom Factor", "float", 1.0, "Above 1 magnifies, below 1 shows more around the picture.",
+        "Zoom Factor", "float", 1.0, "Above 1 magnifies, below 1 shows more around the image.",
         min=1e-5, max=1e5, then="_emit_changed",
     )  # fmt: skip
     #: Displays that are not drawn from the camera: names, or paths as ``/Group/Name``.
@@ -475,7 +475,7 @@ class CameraDisplay(PictureDisplay):
         self._infos: MessageQueue | None = None
         self._info_topic = ""
         self._lens: _Lens | None = None
-        #: Of the camera's frame at the time of the picture, in the fixed frame.
+        #: Pose of the camera's frame at the time of the image, in the fixed frame.
         self._pose: NDArray[np.float64] | None = None
         self._placed_at = 0.0
         super().__init__(parent, runtime)
@@ -543,7 +543,7 @@ class CameraDisplay(PictureDisplay):
         session.background(lambda: Subscriptions(node, {topic: qos}, queue), done)
 
     def _miss_info(self) -> None:
-        text = f"no CameraInfo received on {self._info_topic}; the picture is shown alone"
+        text = f"no CameraInfo received on {self._info_topic}; the image is shown alone"
         self.set_status("Camera Info", "warn", text)
 
     def _on_closed(self, endpoint: SharedStream | None) -> None:
@@ -560,7 +560,7 @@ class CameraDisplay(PictureDisplay):
         items, error = self._infos.drain()
         before = self._lens
         if error:
-            # What is drawn by another lens would be at wrong places.
+            # Another lens would draw the scene at wrong positions.
             self._lens = None
             self.set_status("Camera Info", "error", error)
         elif items:
@@ -570,7 +570,7 @@ class CameraDisplay(PictureDisplay):
             self._place_waiting()
             self.pictureChanged.emit()
 
-    # -- pictures --------------------------------------------------------------------------------
+    # -- images ----------------------------------------------------------------------------------
 
     def _take_picture(self, picture: Picture) -> None:
         self._waiting.append(picture)
@@ -578,7 +578,7 @@ class CameraDisplay(PictureDisplay):
         self._place_waiting()
 
     def _place_waiting(self) -> None:
-        """Show the newest picture whose transform is known; without one for a while, alone."""
+        """Show the newest image whose transform is known; without one for a while, alone."""
         for at in range(len(self._waiting) - 1, -1, -1):
             picture = self._waiting[at]
             pose = self._pose_of(picture)
@@ -596,12 +596,12 @@ class CameraDisplay(PictureDisplay):
         stamp = picture.frame.stamp
         frame = picture.frame.frame_id.lstrip("/")
         if not frame:
-            self.set_status("Transform", "error", "header.frame_id of the picture is empty")
+            self.set_status("Transform", "error", "header.frame_id of the image is empty")
             return None
         return self.place_of(frame, 0 if stamp is None else stamp.nanoseconds)
 
     def on_transforms(self) -> None:
-        """Show what has waited for transforms, also the scene in a picture that is shown alone."""
+        """Show images that waited for transforms, and add the scene to one that is shown alone."""
         if self._waiting:
             self._place_waiting()
         elif self._picture is not None and self._pose is None:
@@ -610,13 +610,13 @@ class CameraDisplay(PictureDisplay):
                 self.pictureChanged.emit()
 
     def check_frames(self) -> None:
-        """Show a picture alone that has waited for long, also if no transform is received."""
+        """Show an image alone that has waited for long, also if no transform is received."""
         if self._waiting:
             self._place_waiting()
         super().check_frames()
 
     def on_fixed_frame(self) -> None:
-        """Look at the scene from the camera's place in the new fixed frame."""
+        """Look at the scene from the camera's pose in the new fixed frame."""
         if self._picture is not None:
             self._pose = self._pose_of(self._picture)
             self.pictureChanged.emit()
@@ -628,7 +628,7 @@ class CameraDisplay(PictureDisplay):
         self.pictureChanged.emit()
 
     def reset(self) -> None:
-        """Remove the picture, and what is drawn in it."""
+        """Remove the image and the scene in it."""
         self._waiting.clear()
         self._pose = None
         super().reset()
@@ -668,7 +668,7 @@ class CameraDisplay(PictureDisplay):
         return 0.0 if self.imageRendering == "background" else float(self.overlayAlpha)
 
     def _size(self) -> tuple[int, int] | None:
-        """Return width and height of the picture that the lens is for."""
+        """Return width and height of the image that the lens belongs to."""
         picture, lens = self._picture, self._lens
         if picture is None or lens is None:
             return None
@@ -676,7 +676,7 @@ class CameraDisplay(PictureDisplay):
         return lens.width or whole.width, lens.height or whole.height
 
     def picture_place(self, width: float, height: float) -> QtCore.QRectF:
-        """Return where the picture is in an item; it may be larger than that."""
+        """Return the image's rectangle in an item, which it may exceed."""
         size, lens = self._size(), self._lens
         if size is None or lens is None:
             place = super().picture_place(width, height)
@@ -685,11 +685,11 @@ class CameraDisplay(PictureDisplay):
         return _placed(width, height, (size[0] / lens.fx) / (size[1] / lens.fy), self._zoom())
 
     def camera_for(self, width: float, height: float) -> PinholeCamera | None:
-        """Return the camera that sees the scene as the picture does; None while it is unknown.
+        """Return the camera that sees the scene as the image does; None while it is unknown.
 
         Args:
-            width: Of the item that shows it.
-            height: The same.
+            width: Width of the item that shows it.
+            height: Height of the item.
         """
         size, lens, pose = self._size(), self._lens, self._pose
         if size is None or lens is None or pose is None or min(width, height) <= 0:
@@ -760,7 +760,7 @@ def _hidden_paths(saved: Any, above: str = "") -> Iterator[str]:
 
 
 def _placed(width: float, height: float, aspect: float, zoom: float) -> QtCore.QRectF:
-    """Return the place of a picture of an aspect ratio in the middle of an item."""
+    """Return the centred rectangle of an image of an aspect ratio in an item."""
     wide = min(width, height * aspect) * zoom
     high = min(height, width / aspect) * zoom
     return QtCore.QRectF((width - wide) / 2, (height - high) / 2, wide, high)
@@ -770,7 +770,7 @@ def _placed(width: float, height: float, aspect: float, zoom: float) -> QtCore.Q
 
 
 class PictureItem(ImageItem):
-    """Paints the pictures of a display; for ``ImagePanel``."""
+    """Paints the images of a display; for ``ImagePanel``."""
 
     displayChanged = Signal()
 
@@ -804,11 +804,11 @@ class PictureItem(ImageItem):
     display = Property(QtCore.QObject, _get_display, _set_display, notify=displayChanged)
 
     def _is_smooth(self, target: QtCore.QRectF, source: QtCore.QRectF) -> bool:
-        """Return whether pixels are mixed: as in RViz, those that are magnified are not."""
+        """Return whether pixels are mixed: as in RViz, magnified ones are not."""
         return target.width() < source.width()
 
     def _place(self, image: QtGui.QImage) -> tuple[QtCore.QRectF, QtCore.QRectF]:
-        """Return the part of the item where the picture is, and which part of it that is."""
+        """Return the part of the item that the image covers, and the part of the image in it."""
         display = self._display
         if display is None or not is_alive(display):
             return super()._place(image)
@@ -825,7 +825,7 @@ class PictureItem(ImageItem):
 
 
 def _size_of(picture: Picture) -> int:
-    """Return about how many bytes a picture takes."""
+    """Return the approximate number of bytes of an image."""
     whole = picture.whole
     received = 0 if whole is None else whole.height * whole.step
     return received + sum(plane.nbytes for plane in picture.frame.planes)

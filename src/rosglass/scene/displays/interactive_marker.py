@@ -145,14 +145,14 @@ class _Connection:
 
 
 class _Server:
-    """What is known of a server.
+    """The known state of a server.
 
     Attributes:
         number: The number of its last change; None while its markers are requested.
-        early: Changes that were received before them.
-        beats: Whether it sends keep-alives.
-        heard: When the last message was received, by the clock of :func:`time.monotonic`.
-        silent: Whether its keep-alives have stopped.
+        early: Changes that were received before its markers.
+        beats: True if it sends keep-alives.
+        heard: Time of the last message, by :func:`time.monotonic`.
+        silent: True once its keep-alives have stopped.
         root: Its markers.
     """
 
@@ -181,13 +181,15 @@ class InteractiveMarkersDisplay(TopicDisplay):
         "Interactive Markers Namespace", "topic", "",
         "Namespace of the server, or its update topic.", then="_on_topic",
     )  # fmt: skip
-    showDescriptions = Setting("Show Descriptions", "bool", True, "Whether texts are shown.")
-    showAxes = Setting("Show Axes", "bool", False, "Whether the axes of markers are shown.")
+    showDescriptions = Setting(
+        "Show Descriptions", "bool", True, "Show the descriptions of markers."
+    )
+    showAxes = Setting("Show Axes", "bool", False, "Show the axes of markers.")
     showVisualAids = Setting(
-        "Show Visual Aids", "bool", False, "Whether the axis of a drag is shown during it."
+        "Show Visual Aids", "bool", False, "Show the axis of a drag while it lasts."
     )
     enableTransparency = Setting(
-        "Enable Transparency", "bool", True, "Whether arrows and rings are translucent.",
+        "Enable Transparency", "bool", True, "Draw arrows and rings translucent.",
         then="_redraw",
     )  # fmt: skip
 
@@ -697,7 +699,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
         control, point = asked
         program = control.marker.record.programs.get(number)
         if program is not None:
-            # RViz runs what a robot's message says; that is no right of a robot.
+            # RViz runs commands of a robot's message; a robot must not do that.
             text = f"entry {number} asks to run {program!r} on this computer, which is not done"
             self.set_status("Menu", "warn", text)
             return

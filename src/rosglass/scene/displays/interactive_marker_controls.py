@@ -63,7 +63,7 @@ _COMMANDS = {POSE_UPDATE: "drag by", MENU_SELECT: "menu entry", BUTTON_CLICK: "b
 _HOLD_S = 0.25
 #: Seconds within which a server repeats the poses that it receives.
 _ECHO_S = 2.0
-#: What is added to the colours of a control under the mouse, and of one that is pressed.
+#: Brightening of the colours of a control under the mouse, and of a pressed one.
 _HOVERED, _PRESSED = 0.3, 0.5
 #: Points of a marker above which it is not painted anew to be highlighted.
 _MAX_HIGHLIGHTED = 50_000
@@ -95,7 +95,7 @@ class Control:
         self._highlight = 0.0
         #: By how much it was rotated about its axis, radians, which only it remembers.
         self._angle = 0.0
-        #: Where it was pressed, in the marker's frame, while it is dragged.
+        #: The pressed point, in the marker's frame, while it is dragged.
         self._grab: Matrix | None = None
         self._pose = self._turn = np.eye(4)
         self._angle_then = 0.0
@@ -116,7 +116,7 @@ class Control:
 
     @property
     def help(self) -> str:
-        """What the mouse does, for the status bar."""
+        """The instructions for the status bar."""
         text = HELP.get(self.record.mode, "")
         if self.marker.record.menu and self.record.mode != MENU:
             text += " Right-Click: Show context menu."
@@ -706,14 +706,14 @@ def facing_turn(turn: Matrix, angle: float, camera: Camera) -> Matrix:
 def point_on_plane(
     camera: Camera, x: float, y: float, point: Vector, normal: Vector
 ) -> Vector | None:
-    """Return the point of a plane that is seen at a place of the picture; None for none.
+    """Return the point of a plane that is seen at a point of the image; None without one.
 
     Args:
         camera: The camera.
         x: Units of the item, from its left edge.
         y: The same, from its upper edge.
         point: A point of the plane.
-        normal: Of the plane, of length 1.
+        normal: Normal of the plane, of length 1.
     """
     origin, way = (np.array(part) for part in camera.ray(x, y))
     slope = float(way @ normal)
@@ -724,7 +724,7 @@ def point_on_plane(
 
 
 def point_on_axis(camera: Camera, x: float, y: float, point: Vector, axis: Vector) -> Vector | None:
-    """Return the point of a straight line that is seen nearest to a place of the picture.
+    """Return the point of a straight line that is seen nearest to a point of the image.
 
     Args:
         camera: The camera.

@@ -44,7 +44,7 @@ __all__ = [
 INHERIT, FIXED, VIEW_FACING = range(3)
 NONE, MENU, BUTTON, MOVE_AXIS, MOVE_PLANE, ROTATE_AXIS, MOVE_ROTATE = range(7)
 MOVE_3D, ROTATE_3D, MOVE_ROTATE_3D = range(7, 10)
-#: What the mouse does, as RViz says it in its status bar.
+#: Instructions for the mouse by mode, as in RViz's status bar.
 HELP = {
     MENU: "Left-Click: Show menu.",
     BUTTON: "Left-Click: Activate.",
@@ -183,9 +183,9 @@ def _read_controls(message: Any, scale: float) -> Iterable[ControlRecord]:
         if not np.isfinite(rotation).all():
             raise Error(f"control {name!r}: orientation {rotation} is not finite")
         if not NONE <= control.interaction_mode <= MOVE_ROTATE_3D:
-            raise Error(f"control {name!r}: interaction_mode {control.interaction_mode} is none")
+            raise Error(f"control {name!r}: interaction_mode {control.interaction_mode} is invalid")
         if not INHERIT <= control.orientation_mode <= VIEW_FACING:
-            raise Error(f"control {name!r}: orientation_mode {control.orientation_mode} is none")
+            raise Error(f"control {name!r}: orientation_mode {control.orientation_mode} is invalid")
         record = ControlRecord(
             name,
             control.interaction_mode,
@@ -321,7 +321,7 @@ def description_control(marker: InteractiveMarkerRecord) -> ControlRecord:
 
 
 class MarkerUpdate(NamedTuple):
-    """What a server has sent.
+    """A message of a server.
 
     Attributes:
         server: Its name; empty in ROS 2, where one server has a namespace.

@@ -125,15 +125,15 @@ class MapDisplay(TopicDisplay):
 
     alpha = Setting("Alpha", "float", 0.7, "Opacity.", min=0.0, max=1.0)
     colorScheme = Setting(
-        "Color Scheme", "enum", "map", "How values are coloured.", choices=["map", "costmap", "raw"]
+        "Color Scheme", "enum", "map", "Colors of the values.", choices=["map", "costmap", "raw"]
     )
-    drawBehind = Setting("Draw Behind", "bool", False, "Whether it is drawn below all else.")
+    drawBehind = Setting("Draw Behind", "bool", False, "Draw it below everything else.")
     useTimestamp = Setting(
-        "Use Timestamp", "bool", False, "Whether it is placed at its own time, not the newest.",
+        "Use Timestamp", "bool", False, "Place it at its own time, not the newest.",
         then="_place_again",
     )  # fmt: skip
     updateTopic = Setting(
-        "Update Topic", "topic", "", "Of updates; the topic with _updates by default.",
+        "Update Topic", "topic", "", "Topic of updates; by default the topic with _updates.",
         then="_schedule",
     )  # fmt: skip
 
@@ -148,7 +148,7 @@ class MapDisplay(TopicDisplay):
     ) -> None:
         self._image = MapImage()
         self._image.owner = self
-        #: What is received, as updates are written into it.
+        #: A copy of the received cells, as updates are written into it.
         self._cells: NDArray[np.uint8] | None = None
         self._corner: NDArray[np.float64] = np.eye(4)
         self._where = ("", 0)
@@ -266,7 +266,7 @@ class GridCellsDisplay(TopicDisplay):
     TYPE = "GridCells"
     MESSAGES = ("nav_msgs/GridCells",)
 
-    color = Setting("Color", "color", "#19ff00", "Of the cells.")
+    color = Setting("Color", "color", "#19ff00", "Color of the cells.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
 
     def __init__(

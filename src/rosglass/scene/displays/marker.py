@@ -78,7 +78,7 @@ __all__ = [
 
 _log = logging.getLogger("rosglass.scene")
 
-#: What lists of points are drawn as.
+#: Point styles of lists of points.
 _POINT_STYLES = {CUBE_LIST: "boxes", SPHERE_LIST: "spheres", POINTS: "squares"}
 _IDENTITY = np.eye(4)
 #: Markers that wait for a transform, of which the oldest make room, and their bytes.
@@ -109,23 +109,23 @@ class MarkerGroup:
     """Markers that are shown and hidden together, such as those of one namespace.
 
     Args:
-        owner: What a pick of them finds; None where they cannot be picked.
+        owner: The result of picking them; None if they cannot be picked.
     """
 
     def __init__(self, owner: Any) -> None:
         self.root = Group()
         self._owner = owner
         self._batches: dict[Shape, SolidBatch] = {}
-        #: What those that are instances consist of.
+        #: Shapes of markers that are drawn as instances.
         self._solids: dict[tuple[str, int], tuple[Shape, ...]] = {}
-        #: Batches of texts, lines and triangles, by what those of one have in common; the last one
+        #: Batches of texts, lines and triangles, by their common properties; the last one
         #: takes further markers.
         self._joint: dict[tuple[Any, ...], list[_Joint]] = {}
-        #: Those of markers that are in one.
+        #: The batches of markers that are in one.
         self._batch_of: dict[tuple[str, int], _Joint] = {}
         #: Drawables of markers that are drawn on their own.
         self._own: dict[tuple[str, int], Group] = {}
-        #: What those of meshes look like.
+        #: The look of mesh markers.
         self._looks: dict[tuple[str, int], tuple[Any, ...]] = {}
 
     def _batch(self, shape: Shape) -> SolidBatch:
@@ -159,7 +159,7 @@ class MarkerGroup:
             return
         cloud = next(iter(own)) if own and marker.kind in _POINT_STYLES else None
         if own and isinstance(cloud, Points):
-            # What is new is uploaded over several pictures: until then, it would be missing.
+            # New data is uploaded over several frames: until then, it would be missing.
             _set_list(cloud, marker)
             own.pose = place
             return
@@ -240,7 +240,7 @@ class MarkerGroup:
 
     @property
     def is_empty(self) -> bool:
-        """Whether it has no marker."""
+        """True if it has no marker."""
         return not (self._own or self._solids or self._batch_of)
 
     def flush(self) -> None:

@@ -63,7 +63,7 @@ _COLORED = (LINE_STRIP, LINE_LIST, CUBE_LIST, SPHERE_LIST, POINTS, TRIANGLE_LIST
 _HEAD_SHARE = 0.23
 #: Turns z, along which cylinders and cones stand, to x, along which arrows point.
 _TO_X = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-#: What markers consist of, where these are always the same shapes.
+#: Shapes of markers that always consist of the same ones.
 _SOLIDS: dict[int, tuple[Shape, ...]] = {
     CUBE: (BOX,),
     SPHERE_TYPE: (SPHERE,),

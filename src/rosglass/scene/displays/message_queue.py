@@ -226,7 +226,7 @@ class Subscriptions:
 
     @property
     def hint(self) -> str:
-        """What may be missing, e.g. that earlier messages are kept which were not asked for."""
+        """Possible reasons for missing messages, e.g. earlier ones are kept but not requested."""
         return "; ".join(filter(None, (one.hint for one in list(self._open))))
 
     def close(self) -> None:

@@ -44,7 +44,7 @@ class Parts:
         self.describe = describe
         self.details: dict[str, Setting] = {detail.path: detail for detail in details}
         self._on_change, self._default, self._as_mapping = on_change, default, as_mapping
-        #: What differs from the default, by the names of parts; also of those to come.
+        #: Differences from the default, by the names of parts; also of future parts.
         self._switched: dict[str, bool] = {}
         self._values: dict[str, dict[str, Any]] = {}
 

@@ -81,7 +81,7 @@ _MAX_SCAN_S = 10.0
 _STILL = 1e-5
 
 
-#: Of settings: the color transformers and styles that they are of.
+#: Conditions of settings: the color transformers and styles that they belong to.
 _INTENSITY = {"wanted_transformer": "Intensity"}
 _AXIS_COLOR = {"wanted_transformer": "AxisColor"}
 _RAINBOW = {**_INTENSITY, "useRainbow": True}
@@ -224,7 +224,7 @@ class _ShownCloud:
             return [("Points", str(data.cloud.finite_count)), ("Fields", names)]
         point = data.vertices.point_index(number)
         (_, position), *values = data.cloud.describe_point(point)
-        # The place in the fixed frame is known to who has selected it.
+        # The selection knows the position in the fixed frame.
         found = [("Point", point), (f"Position in {self._frame or 'its frame'}", position), *values]
         return [(name, _text_of(value)) for name, value in found]
 
@@ -236,7 +236,7 @@ def _text_of(value: Any) -> str:
 
 
 def _channel(default: str) -> Setting:
-    text = "Of Intensity: the field."
+    text = "Field that Intensity colors by."
     return Setting("Channel Name", "string", default, text, shown_if=_INTENSITY)
 
 
@@ -245,7 +245,7 @@ def _autocompute(default: bool) -> Setting:
         "Autocompute Intensity Bounds",
         "bool",
         default,
-        "Whether the bounds are those of the points.",
+        "Take the bounds from the points.",
         shown_if=_INTENSITY,
     )
 
@@ -260,13 +260,13 @@ def _bound(path: str, default: float) -> Setting:
 
 
 def _invert(default: bool) -> Setting:
-    text = "Whether red is at the maximum."
+    text = "Show the maximum in red."
     return Setting("Invert Rainbow", "bool", default, text, shown_if=_RAINBOW)
 
 
 def _size(**conditions: Any) -> Setting:
     return Setting(
-        "Size (m)", "float", 0.01, "Of all styles but Points, in metres.", min=0.0001,
+        "Size (m)", "float", 0.01, "Size of points in metres.", min=0.0001,
         max=_MAX_SIZE_M, shown_if={**_METRIC, **conditions},
     )  # fmt: skip
 
@@ -274,57 +274,65 @@ def _size(**conditions: Any) -> Setting:
 class CloudDisplay(TopicDisplay):
     """Base class of displays of points: their settings, colors and Decay Time."""
 
-    #: What makes a cloud of a message, in the node's thread.
+    #: Converts a message to a cloud, in the node's thread.
     READ: ClassVar[Callable[[Any], Cloud]] = Cloud.from_message
 
-    selectable = Setting("Selectable", "bool", True, "Whether points can be selected.")
+    selectable = Setting("Selectable", "bool", True, "Let points be selected.")
     style = Setting(
         "Style", "enum", "Flat Squares", "How points are drawn.",
         choices=["Points", *_METRIC["style"]],
     )  # fmt: skip
     size = _size()
     sizePixels = Setting(
-        "Size (Pixels)", "float", 3.0, "Of the style Points.", min=1.0, max=_MAX_SIZE_PX,
+        "Size (Pixels)", "float", 3.0, "Size of points in pixels.", min=1.0, max=_MAX_SIZE_PX,
         shown_if={"style": "Points"},
     )  # fmt: skip
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     decayTime = Setting(
-        "Decay Time", "float", 0.0, "Seconds that points are shown; 0 until the next message.",
+        "Decay Time", "float", 0.0, "Seconds for which points are shown; 0 until the next message.",
         min=0.0, max=1e9,
     )  # fmt: skip
     positionTransformer = Setting(
-        "Position Transformer", "enum", "", "Where positions are from; empty for x, y and z.",
+        "Position Transformer", "enum", "", "Source of positions; empty for x, y and z.",
         choices=["", "XYZ"],
     )  # fmt: skip
     colorTransformer = Setting(
-        "Color Transformer", "enum", "", "Where colors are from; empty for RViz's choice.",
+        "Color Transformer", "enum", "", "Source of colors; empty for RViz's choice.",
         choices=["", *COLOR_TRANSFORMERS],
     )  # fmt: skip
     axis = Setting(
-        "Axis", "enum", "Z", "Of AxisColor: the axis along which colors change.",
+        "Axis", "enum", "Z", "Axis along which colors change (AxisColor).",
         choices=["X", "Y", "Z"], shown_if=_AXIS_COLOR,
     )  # fmt: skip
     autocomputeValueBounds = Setting(
-        "Autocompute Value Bounds", "bool", True, "Whether the bounds are those of the points.",
+        "Autocompute Value Bounds", "bool", True, "Take the bounds from the points.",
         shown_if=_AXIS_COLOR,
     )  # fmt: skip
     minValue = _bound("Autocompute Value Bounds/Min Value", -10.0)
     maxValue = _bound("Autocompute Value Bounds/Max Value", 10.0)
     useFixedFrame = Setting(
-        "Use Fixed Frame", "bool", True, "Whether the axis is that of the fixed frame.",
+        "Use Fixed Frame", "bool", True, "Take the axis of the fixed frame.",
         shown_if=_AXIS_COLOR,
     )  # fmt: skip
     color = Setting(
-        "Color", "color", "#ffffff", "Of FlatColor.", shown_if={"wanted_transformer": "FlatColor"}
+        "Color",
+        "color",
+        "#ffffff",
+        "Color of FlatColor.",
+        shown_if={"wanted_transformer": "FlatColor"},
     )
     channelName = _channel("intensity")
     useRainbow = Setting(
-        "Use rainbow", "bool", True, "Whether colors are a rainbow, or between two colors.",
+        "Use rainbow", "bool", True, "Use rainbow colors instead of two colors.",
         shown_if=_INTENSITY,
     )  # fmt: skip
     invertRainbow = _invert(False)
-    minColor = Setting("Min Color", "color", "#000000", "At the minimum.", shown_if=_TWO_COLORS)
-    maxColor = Setting("Max Color", "color", "#ffffff", "At the maximum.", shown_if=_TWO_COLORS)
+    minColor = Setting(
+        "Min Color", "color", "#000000", "Color of the minimum.", shown_if=_TWO_COLORS
+    )
+    maxColor = Setting(
+        "Max Color", "color", "#ffffff", "Color of the maximum.", shown_if=_TWO_COLORS
+    )
     autocomputeIntensityBounds = _autocompute(True)
     minIntensity = _bound("Min Intensity", 0.0)
     maxIntensity = _bound("Max Intensity", 4096.0)
@@ -770,11 +778,11 @@ class DepthCloudDisplay(CloudDisplay):
     IS_CONTINUOUS = True
 
     transport = Setting(
-        "Depth Map Transport Hint", "enum", "raw", "How depth images are transported.",
+        "Depth Map Transport Hint", "enum", "raw", "Transport of depth images.",
         choices=["raw", _COMPRESSED_DEPTH], then="_on_topic",
     )  # fmt: skip
     colorTransport = Setting(
-        "Color Transport Hint", "enum", "raw", "How color images are transported.",
+        "Color Transport Hint", "enum", "raw", "Transport of color images.",
         choices=["raw", "compressed"], then="_on_topic",
     )  # fmt: skip
     colorTopic = Setting(
@@ -783,20 +791,20 @@ class DepthCloudDisplay(CloudDisplay):
     )  # fmt: skip
     size = _size(autoSize=False)
     autoSize = Setting(
-        "Auto Size", "bool", True, "Whether points are as large as their pixels.", shown_if=_METRIC
+        "Auto Size", "bool", True, "Draw points as large as their pixels.", shown_if=_METRIC
     )
     autoSizeFactor = Setting(
-        "Auto Size/Auto Size Factor", "float", 1.0, "What that size is multiplied with.",
+        "Auto Size/Auto Size Factor", "float", 1.0, "Factor of the automatic size.",
         min=0.0001, max=_MAX_SIZE_M, shown_if={"autoSize": True},
     )  # fmt: skip
     occlusionCompensation = Setting(
         "Occlusion Compensation", "bool", False,
-        "Whether points stay when nearer ones hide them, until the camera moves.",
+        "Keep points that nearer ones hide, until the camera moves.",
         then="_on_occlusion",
     )  # fmt: skip
     occlusionTimeOut = Setting(
         "Occlusion Compensation/Occlusion Time-Out", "float", 30.0,
-        "Seconds for which hidden points stay.", min=0.0, max=1e9,
+        "Seconds for which hidden points are kept.", min=0.0, max=1e9,
         shown_if={"occlusionCompensation": True},
     )  # fmt: skip
 
@@ -805,7 +813,7 @@ class DepthCloudDisplay(CloudDisplay):
     ) -> None:
         self._matcher = _DepthMatcher("", "", 1)
         self._occlusion = OcclusionBuffer()
-        #: Where the camera was when the buffer was reset; None before the first image.
+        #: Pose of the camera when the buffer was reset; None before the first image.
         self._camera_pose: NDArray[np.float64] | None = None
         super().__init__(parent, runtime)
 

@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 _MAX_POSES = 100_000
-#: Where the position and the quaternion of a pose are in its message.
+#: Paths of a pose's position and quaternion in its message.
 _POSE_PATHS = (
     *("position.x", "position.y", "position.z"),
     *("orientation.x", "orientation.y", "orientation.z", "orientation.w"),
@@ -44,10 +44,10 @@ _POSE_PATHS = (
 _MAX_KEPT = 10_000
 #: Deviations of orientations that are drawn as this, as in RViz.
 _MAX_DEVIATION_RAD = math.radians(89)
-#: Of settings: the styles of a path that they are of.
+#: Conditions of settings: the styles of a path that they belong to.
 _BILLBOARDS = {"lineStyle": "Billboards"}
 _POSE_AXES, _POSE_ARROWS = {"poseStyle": "Axes"}, {"poseStyle": "Arrows"}
-#: Of settings: the shapes that they are of, and the covariances.
+#: Conditions of settings: the shapes and covariances that they belong to.
 _ARROW, _AXES = {"shape": "Arrow"}, {"shape": "Axes"}
 _FLAT_ARROW, _SOLID_ARROW = {"shape": "Arrow (Flat)"}, {"shape": "Arrow (3D)"}
 _ANY_ARROW = {"shape": ("Arrow (Flat)", "Arrow (3D)")}
@@ -57,14 +57,15 @@ _POSITION, _ORIENTATION = {"covariancePosition": True}, {"covarianceOrientation"
 
 def _metres(path: str, default: float, shown_if: Mapping[str, Any]) -> Setting:
     """Return the setting of a length, and the settings for which it has an effect."""
-    return Setting(path, "float", default, "In metres.", min=0.0, shown_if=shown_if)
+    text = f"{path.rpartition('/')[2].capitalize()} in metres."
+    return Setting(path, "float", default, text, min=0.0, shown_if=shown_if)
 
 
 def _shape_settings() -> tuple[Setting, ...]:
     """Return the settings of a pose that is shown as an arrow or as axes."""
     return (
         Setting("Shape", "enum", "Arrow", "How a pose is drawn.", choices=["Arrow", "Axes"]),
-        Setting("Color", "color", "#ff1900", "Of arrows.", shown_if=_ARROW),
+        Setting("Color", "color", "#ff1900", "Color of arrows.", shown_if=_ARROW),
         Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0),
         _metres("Shaft Length", 1.0, _ARROW),
         _metres("Shaft Radius", 0.05, _ARROW),
@@ -155,7 +156,7 @@ class PoseArrayDisplay(TopicDisplay):
         "Shape", "enum", "Arrow (Flat)", "How poses are drawn.",
         choices=["Arrow (Flat)", "Arrow (3D)", "Axes"],
     )  # fmt: skip
-    color = Setting("Color", "color", "#ff1900", "Of arrows.", shown_if=_ANY_ARROW)
+    color = Setting("Color", "color", "#ff1900", "Color of arrows.", shown_if=_ANY_ARROW)
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     arrowLength = _metres("Arrow Length", 0.3, _FLAT_ARROW)
     headRadius = _metres("Head Radius", 0.03, _SOLID_ARROW)
@@ -239,12 +240,12 @@ def _read_covariance(message: Any) -> _Covariance:
 
 
 class _Uncertainty(NamedTuple):
-    """What one covariance is drawn as: matrices of shapes, 4 x 4.
+    """The shapes of one covariance: matrices, 4 x 4.
 
     Attributes:
-        ellipsoid: Of the position; None for none.
+        ellipsoid: Of the position; None without one.
         discs: Of the orientation, each with the axis whose end it is around.
-        cone: Of the orientation of a robot in the plane, instead; None for none.
+        cone: Of the orientation of a robot in the plane, instead; None without one.
     """
 
     ellipsoid: NDArray[np.float64] | None
@@ -257,33 +258,41 @@ class _WithCovariance(TopicDisplay):
 
     shape, color, alpha, *_lengths = _shape_settings()
     shaftLength, shaftRadius, headLength, headRadius, axesLength, axesRadius = _lengths
-    covariance = Setting("Covariance", "bool", True, "Whether covariances are shown.")
+    covariance = Setting("Covariance", "bool", True, "Show covariances.")
     covariancePosition = Setting(
-        "Covariance/Position", "bool", True, "Of positions.", shown_if=_COVARIANCE
+        "Covariance/Position", "bool", True, "Show covariances of positions.", shown_if=_COVARIANCE
     )
     positionColor = Setting(
-        "Covariance/Position/Color", "color", "#cc33cc", "Of the ellipsoid.", shown_if=_POSITION
+        "Covariance/Position/Color",
+        "color",
+        "#cc33cc",
+        "Color of the ellipsoid.",
+        shown_if=_POSITION,
     )
     positionAlpha = Setting(
         "Covariance/Position/Alpha", "float", 0.3, "Opacity.", min=0.0, max=1.0, shown_if=_POSITION
     )
     positionScale = Setting(
-        "Covariance/Position/Scale", "float", 1.0, "Standard deviations.", min=0.0,
+        "Covariance/Position/Scale", "float", 1.0, "Size in standard deviations.", min=0.0,
         shown_if=_POSITION,
     )  # fmt: skip
     covarianceOrientation = Setting(
-        "Covariance/Orientation", "bool", True, "Of orientations.", shown_if=_COVARIANCE
+        "Covariance/Orientation",
+        "bool",
+        True,
+        "Show covariances of orientations.",
+        shown_if=_COVARIANCE,
     )
     orientationFrame = Setting(
-        "Covariance/Orientation/Frame", "enum", "Local", "Whose axes rotations are around.",
+        "Covariance/Orientation/Frame", "enum", "Local", "Frame of the rotations' axes.",
         choices=["Local", "Fixed"], shown_if=_ORIENTATION,
     )  # fmt: skip
     orientationColorStyle = Setting(
-        "Covariance/Orientation/Color Style", "enum", "Unique", "One colour, or the axes' colours.",
+        "Covariance/Orientation/Color Style", "enum", "Unique", "One color, or those of the axes.",
         choices=["Unique", "RGB"], shown_if=_ORIENTATION,
     )  # fmt: skip
     orientationColor = Setting(
-        "Covariance/Orientation/Color", "color", "#ffff7f", "Of the shapes.",
+        "Covariance/Orientation/Color", "color", "#ffff7f", "Color of the shapes.",
         shown_if={**_ORIENTATION, "orientationColorStyle": "Unique"},
     )  # fmt: skip
     orientationAlpha = Setting(
@@ -291,11 +300,11 @@ class _WithCovariance(TopicDisplay):
         shown_if=_ORIENTATION,
     )  # fmt: skip
     orientationOffset = Setting(
-        "Covariance/Orientation/Offset", "float", 1.0, "From the pose, in metres.", min=0.0,
+        "Covariance/Orientation/Offset", "float", 1.0, "Distance from the pose in metres.", min=0.0,
         shown_if=_ORIENTATION,
     )  # fmt: skip
     orientationScale = Setting(
-        "Covariance/Orientation/Scale", "float", 1.0, "Standard deviations.", min=0.0,
+        "Covariance/Orientation/Scale", "float", 1.0, "Size in standard deviations.", min=0.0,
         shown_if=_ORIENTATION,
     )  # fmt: skip
 
@@ -307,7 +316,7 @@ class _WithCovariance(TopicDisplay):
         self._poses: list[NDArray[np.float64]] = []
         #: Beside each pose: its covariance, and the rotation of its frame in the fixed frame.
         self._covariances: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
-        #: What the first of them are drawn as, with the settings that it depends on.
+        #: Shapes of the first of them, with the settings that they depend on.
         self._shapes: list[_Uncertainty] = []
         self._shapes_look: tuple[Any, ...] = ()
         self._ellipsoids, self._discs, self._cones = Mesh(SPHERE), Mesh(CYLINDER), Mesh(CONE)
@@ -454,12 +463,12 @@ class OdometryDisplay(_WithCovariance):
     MESSAGES = ("nav_msgs/Odometry",)
 
     positionTolerance = Setting(
-        "Position Tolerance", "float", 0.1, "Metres between two poses that are shown.", min=0.0
+        "Position Tolerance", "float", 0.1, "Minimum metres between shown poses.", min=0.0
     )
     angleTolerance = Setting(
-        "Angle Tolerance", "float", 0.1, "Radians between two poses that are shown.", min=0.0
+        "Angle Tolerance", "float", 0.1, "Minimum radians between shown poses.", min=0.0
     )
-    keep = Setting("Keep", "int", 100, "How many poses are shown; 0 for all.", min=0)
+    keep = Setting("Keep", "int", 100, "Number of poses shown; 0 for all.", min=0)
 
     #: RViz has the look of a pose below its shape here.
     SETTINGS: ClassVar[dict[str, Setting]] = {}
@@ -526,20 +535,25 @@ class PathDisplay(HistoryDisplay):
         "Line Style", "enum", "Lines", "How the line is drawn.", choices=["Lines", "Billboards"]
     )
     lineWidth = Setting(
-        "Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001, shown_if=_BILLBOARDS
+        "Line Width",
+        "float",
+        0.03,
+        "Width of billboards, in metres.",
+        min=0.001,
+        shown_if=_BILLBOARDS,
     )
-    color = Setting("Color", "color", "#19ff00", "The colour of the line.")
+    color = Setting("Color", "color", "#19ff00", "Color of the line.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     bufferLength = Setting(
-        "Buffer Length", "int", 1, "How many paths are shown.", min=1, max=1000, then="_on_length"
+        "Buffer Length", "int", 1, "Number of paths shown.", min=1, max=1000, then="_on_length"
     )
-    offset = Setting("Offset", "vector", [0, 0, 0], "Of the path, in metres.")
+    offset = Setting("Offset", "vector", [0, 0, 0], "Offset of the path, in metres.")
     poseStyle = Setting(
         "Pose Style", "enum", "None", "How poses are drawn.", choices=["None", "Axes", "Arrows"]
     )
     axesLength = _metres("Length", 0.3, _POSE_AXES)
     axesRadius = _metres("Radius", 0.03, _POSE_AXES)
-    poseColor = Setting("Pose Color", "color", "#ff55ff", "Of arrows.", shown_if=_POSE_ARROWS)
+    poseColor = Setting("Pose Color", "color", "#ff55ff", "Color of arrows.", shown_if=_POSE_ARROWS)
     shaftLength = _metres("Shaft Length", 0.1, _POSE_ARROWS)
     headLength = _metres("Head Length", 0.2, _POSE_ARROWS)
     shaftDiameter = _metres("Shaft Diameter", 0.1, _POSE_ARROWS)

@@ -67,7 +67,7 @@ _PROGRESS_S = 0.1
 _RETRY_MS = 2000
 #: RViz's colour of what has no material.
 _NO_MATERIAL = (1.0, 0.0, 0.0, 1.0)
-#: That of parts of mesh files without one.
+#: Color of parts of mesh files without a color.
 _GREY = (0.6, 0.6, 0.6, 1.0)
 #: RViz's axes of a link: length and diameter, metres.
 _AXES_M, _AXES_WIDTH_M = 0.1, 0.01
@@ -76,8 +76,8 @@ _TRAIL_COLOR, _TRAIL_WIDTH_M, _TRAIL_STEP_M, _TRAIL_POINTS = (0.0, 0.5, 0.5, 1.0
 #: Settings that each link has of its own.
 _LINK_DETAILS = (
     Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0),
-    Setting("Show Trail", "bool", False, "Whether a line shows where the link was."),
-    Setting("Show Axes", "bool", False, "Whether the axes of its frame are shown."),
+    Setting("Show Trail", "bool", False, "Show the link's path as a line."),
+    Setting("Show Axes", "bool", False, "Show the axes of the link's frame."),
 )
 #: Status lines of links without a transform, before the rest is counted.
 _MAX_LINK_LINES = 10
@@ -87,12 +87,12 @@ _AUTOMATIC, _TOPIC, _FILE, _PARAMETER = "Automatic", "Topic", "File", "Parameter
 
 
 class DescriptionSource:
-    """Where a description comes from: reads or receives it, and hands its text on.
+    """Source of a robot description: reads or receives it, and hands its text on.
 
     Args:
         node: The node.
         kind: ``Topic``, ``File`` or ``Parameter``.
-        name: Of the topic, file or parameter.
+        name: Name of the topic, file or parameter.
         on_text: Called with each text, in any thread.
     """
 
@@ -135,11 +135,11 @@ class DescriptionSource:
 
 
 class DescriptionLoader:
-    """Reads descriptions in the scene's thread: one at a time, and of those that wait the newest.
+    """Reads descriptions in the scene's thread: one at a time, and only the newest waiting one.
 
     Args:
-        read: Called there with the text, its source, what finds meshes, and a function to call with
-            the number of meshes that were read, and that of all.
+        read: Called there with the text, its source, a finder of meshes, and a function to call
+            with the number of meshes that were read, and that of all.
         on_read: Called in the GUI thread with the text and what `read` returned, or its error.
         on_progress: Called in the GUI thread with the text and these numbers.
     """
@@ -151,7 +151,7 @@ class DescriptionLoader:
         on_progress: Callable[[str, int, int], None] = lambda *_: None,
     ) -> None:
         self._read, self._on_read, self._on_progress = read, on_read, on_progress
-        #: Where one is being read.
+        #: The scene that is reading one.
         self._busy: Scene | None = None
         self._next: tuple[str, str] | None = None
 
@@ -205,21 +205,21 @@ def _matrix(*scale: float, along: float = 0.0) -> NDArray[np.float64]:
 
 
 def read_texture(source: str | bytes, name: str, resources: ResourceRetriever) -> NDArray[np.uint8]:
-    """Return the pixels of a picture, (h, w, 4).
+    """Return the pixels of an image, (h, w, 4).
 
     Args:
         source: Its URI or path, or its bytes.
-        name: Of the picture or its mesh, for errors.
+        name: Name of the image or its mesh, for errors.
         resources: Reads the file.
 
     Raises:
-        Error: It is missing, too large, or no picture.
+        Error: The file is missing, too large, or not an image.
     """
     data = source if isinstance(source, bytes) else resources.read(source)
     check_texture(data, name)
     image = QtGui.QImage.fromData(data)
     if image.isNull():
-        raise Error(f"{name}: this is no picture that Qt can read")
+        raise Error(f"{name}: this is not an image that Qt can read")
     image = image.convertToFormat(QtGui.QImage.Format.Format_RGBX8888)
     rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
     whole: NDArray[np.uint8] = rows[:, : 4 * image.width()].copy()
@@ -235,7 +235,7 @@ class MeshFiles:
 
     def __init__(self, resources: ResourceRetriever) -> None:
         self._resources = resources
-        #: What was read, or why it was not.
+        #: The meshes, or the errors of reading them.
         self._meshes: dict[Any, list[tuple[MeshPart, Shape]] | Exception] = {}
         self._textures: dict[str | bytes, NDArray[np.uint8] | Exception] = {}
         #: The drawables of each texture.
@@ -308,7 +308,7 @@ def _pixels_of(texture: NDArray[np.uint8] | Exception) -> int:
 
 
 def _halved(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a picture with half the width and height, each pixel the mean of four."""
+    """Return an image with half the width and height, each pixel the mean of four."""
     for axis in (0, 1):
         even = pixels.shape[axis] // 2 * 2
         if even:
@@ -503,11 +503,11 @@ class _Link:
 
 
 class _Part:
-    """What a pick of a link finds.
+    """The result of picking a link.
 
     Attributes:
         display: The display.
-        name: Of the link.
+        name: Name of the link.
     """
 
     def __init__(self, display: RobotModelDisplay, name: str) -> None:
@@ -519,7 +519,7 @@ class _Part:
     def describe(self) -> list[tuple[str, str]]:
         """Return the lines of the Selection panel."""
         display = self.display
-        # Its frame, and not the middle of what is drawn.
+        # Its frame, not the middle of its meshes.
         place = display.describe_frame(*display._frames_of([self.name]))
         return [*place, ("Robot", display.robotName)]
 
@@ -529,30 +529,30 @@ class RobotModelDisplay(Display):
 
     TYPE = "RobotModel"
 
-    visualEnabled = Setting("Visual Enabled", "bool", True, "Whether visuals are shown.")
-    collisionEnabled = Setting("Collision Enabled", "bool", False, "Whether collisions are shown.")
-    updateInterval = Setting("Update Interval", "float", 0.0, "Seconds; 0 for each change.", min=0)
+    visualEnabled = Setting("Visual Enabled", "bool", True, "Show visuals.")
+    collisionEnabled = Setting("Collision Enabled", "bool", False, "Show collisions.")
+    updateInterval = Setting("Update Interval", "float", 0.0, "Seconds; 0 for every change.", min=0)
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     descriptionSource = Setting(
         "Description Source", "enum", _AUTOMATIC,
-        "Where the description is; automatic is the parameter in ROS 1 and the topic in ROS 2.",
+        "Source of the description; automatic is the parameter in ROS 1, the topic in ROS 2.",
         choices=[_AUTOMATIC, _TOPIC, _FILE, _PARAMETER], then="_on_source",
     )  # fmt: skip
     descriptionTopic = Setting(
-        "Description Topic", "topic", "/robot_description", "Of std_msgs/String.",
+        "Description Topic", "topic", "/robot_description", "Topic of type std_msgs/String.",
         then="_on_source", shown_if={"used_source": _TOPIC},
     )  # fmt: skip
     descriptionFile = Setting(
-        "Description File", "path", "", "A URDF file; package:// as well.", then="_on_source",
+        "Description File", "path", "", "Path or package:// URI of a URDF file.", then="_on_source",
         shown_if={"used_source": _FILE},
     )  # fmt: skip
     robotDescription = Setting(
-        "Robot Description", "string", "robot_description", "The parameter's name in ROS 1.",
+        "Robot Description", "string", "robot_description", "Name of the parameter in ROS 1.",
         then="_on_source", shown_if={"used_source": _PARAMETER},
     )  # fmt: skip
-    tfPrefix = Setting("TF Prefix", "string", "", "In front of the names of links, with a slash.")
+    tfPrefix = Setting("TF Prefix", "string", "", "Prefix of the links' frames.")
     allLinksEnabled = Setting(
-        "Links/All Links Enabled", "bool", True, "Shows or hides all links.",
+        "Links/All Links Enabled", "bool", True, "Show or hide all links.",
         then="_on_all_links_enabled",
     )  # fmt: skip
 
@@ -566,7 +566,7 @@ class RobotModelDisplay(Display):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self._bodies: dict[str, _Link] = {}
-        #: Where the links were last, (n, 4, 4), and the state of the transforms then.
+        #: The last poses of the links, (n, 4, 4), and the state of the transforms then.
         self._poses = np.zeros((0, 4, 4))
         self._rest: object = None
         self._body, self._trails = Group(), Group()
@@ -578,7 +578,7 @@ class RobotModelDisplay(Display):
         self._loader = DescriptionLoader(
             _load, weak_callback(self._show), weak_callback(self._show_progress)
         )
-        #: What the status says of the description that is shown.
+        #: Status lines about the description that is shown.
         self._loaded_lines: dict[str, Status] = {}
         self._followed_at = -math.inf
         super().__init__(parent, runtime)
@@ -603,7 +603,7 @@ class RobotModelDisplay(Display):
 
     @property
     def used_source(self) -> str:
-        """Where the description is: ``Topic``, ``File`` or ``Parameter``."""
+        """The source of the description: ``Topic``, ``File`` or ``Parameter``."""
         if self.descriptionSource != _AUTOMATIC:
             return str(self.descriptionSource)
         return _PARAMETER if hasattr(self.node, "parameter_server") else _TOPIC

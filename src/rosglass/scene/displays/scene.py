@@ -56,7 +56,7 @@ _ASK_AGAIN_S, _MAX_ASK_AGAIN_S = 10.0, 300.0
 
 
 class Scene(Element):
-    """What is shown: displays, placed in one frame by the robot's transforms.
+    """The content of a view: displays, placed in one frame by the robot's transforms.
 
     One belongs to each ``SceneView``. Used in the GUI thread.
 
@@ -66,12 +66,12 @@ class Scene(Element):
         has_tf_publishers: Whether transforms have a publisher.
     """
 
-    #: The picture has changed.
+    #: Something drawn has changed.
     changed = Signal()
     fixedFrameChanged = Signal()
     #: Displays were added, removed or moved.
     displaysChanged = Signal()
-    #: Displays of pictures were.
+    #: Image displays were added, removed or moved.
     picturesChanged = Signal()
     #: Transforms were received, or data has to be placed anew.
     placed = Signal()
@@ -85,7 +85,7 @@ class Scene(Element):
         self.root = Group()
         self.draws_in_software = False
         self.has_tf_publishers = True
-        #: What finds meshes and textures, once something has been loaded.
+        #: The retriever of meshes and textures, once something has been loaded.
         self._resources: list[ResourceRetriever] = []
         self._fixed_frame = "map"
         self._displays: list[Display] = []
@@ -95,7 +95,7 @@ class Scene(Element):
         self._link: TfLink | None = None
         self._watch: Any = None
         self._loader: Dispatcher | None = None
-        #: What takes the results of the jobs in its thread, which must not hold displays.
+        #: The receivers of results of the jobs in its thread, which must not hold displays.
         self._takers: dict[object, Callable[[Any], None]] = {}
         self._ticks = 0
         #: The robot's simulated time, when it has changed, and when it last stood still.
@@ -132,7 +132,7 @@ class Scene(Element):
 
     #: All displays, for QML.
     displayList = Property(list, lambda self: list(self._alive()), notify=displaysChanged)
-    #: Those that have a picture, for an ``ImagePanel``.
+    #: The displays with an image, for an ``ImagePanel``.
     pictureList = Property(
         list, lambda self: list(filter(is_alive, self._pictures)), notify=picturesChanged
     )
@@ -196,7 +196,7 @@ class Scene(Element):
         """Show a display.
 
         Raises:
-            Error: It is in another scene, or is no display.
+            Error: The display is in another scene, or is not a display.
         """
         if _checked(display) in self._displays:
             return
@@ -257,7 +257,7 @@ class Scene(Element):
             if one is not None:
                 self._check_own(one)
         if group is not None and group.TYPE != "Group":
-            raise Error(f"{group.label} is no group")
+            raise Error(f"{group.label} is not a group")
         above = group
         while above is not None:
             if above is display:
@@ -490,7 +490,7 @@ class Scene(Element):
 
     @property
     def is_loading(self) -> bool:
-        """Whether files are being read, such as meshes, or wait for it."""
+        """True while files, such as meshes, are being read or wait for it."""
         return bool(self._takers)
 
     def _ask_later(self) -> None:

@@ -73,13 +73,13 @@ def _filter_of(pattern: str) -> Callable[[str], bool | None]:
     some expressions a name of 30 letters keeps Python's ``re`` busy for hours.
 
     Raises:
-        Error: The pattern is no regular expression.
+        Error: The pattern is not a regular expression.
     """
     limit = f"(*LIMIT_MATCH={_MAX_STEPS})"
     regex = QtCore.QRegularExpression(limit + pattern)
     if not regex.isValid():
         at = regex.patternErrorOffset() - len(limit)
-        raise Error(f"this is no regular expression: {regex.errorString()}, at letter {at + 1}")
+        raise Error(f"this is not a regular expression: {regex.errorString()}, at letter {at + 1}")
 
     @lru_cache(2 * _MAX_NAMES)
     def matches(name: str) -> bool | None:
@@ -96,15 +96,15 @@ class TFDisplay(Display):
 
     TYPE = "TF"
 
-    showNames = Setting("Show Names", "bool", True, "Whether names are shown.")
-    showAxes = Setting("Show Axes", "bool", True, "Whether axes are shown.")
-    showArrows = Setting("Show Arrows", "bool", True, "Whether arrows point at parents.")
+    showNames = Setting("Show Names", "bool", True, "Show the names of frames.")
+    showAxes = Setting("Show Axes", "bool", True, "Show the axes of frames.")
+    showArrows = Setting("Show Arrows", "bool", True, "Show arrows to parents.")
     markerScale = Setting(
-        "Marker Scale", "float", 1.0, "Of names, axes and arrows.", min=0.0, max=1e6
+        "Marker Scale", "float", 1.0, "Size of names, axes and arrows.", min=0.0, max=1e6
     )
     markerAlpha = Setting("Marker Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     updateInterval = Setting(
-        "Update Interval", "float", 0.0, "Seconds; 0 for each change.", min=0.0
+        "Update Interval", "float", 0.0, "Seconds; 0 for every change.", min=0.0
     )
     frameTimeout = Setting(
         "Frame Timeout", "float", 15.0, "Seconds until a frame without updates is hidden.", min=1.0
@@ -112,7 +112,7 @@ class TFDisplay(Display):
     whitelist = Setting("Filter (whitelist)", "string", "", "Regular expression of frames to show.")
     blacklist = Setting("Filter (blacklist)", "string", "", "Regular expression of frames to hide.")
     allEnabled = Setting(
-        "Frames/All Enabled", "bool", True, "Shows or hides all frames that there are.",
+        "Frames/All Enabled", "bool", True, "Show or hide all existing frames.",
         then="_on_all_enabled",
     )  # fmt: skip
 
@@ -134,7 +134,7 @@ class TFDisplay(Display):
         #: Those that are set, and the names that take them too long.
         self._filters: dict[str, Callable[[str], bool | None]] = {}
         self._undecided: dict[str, list[str]] = {}
-        #: What is drawn, to draw nothing anew while nothing changes.
+        #: The drawn state, to avoid drawing without a change.
         self._drawn: Any = None
         #: How many transforms were refused, and when the last one was.
         self._refused, self._refused_at = 0, 0.0

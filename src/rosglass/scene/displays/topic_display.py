@@ -88,7 +88,7 @@ class TopicDisplay(Display):
     #: Whether parts of a message have frames of their own, as markers do.
     HAS_FRAMES: ClassVar[bool] = False
     EAGER: ClassVar[bool] = False
-    #: What is requested of the publishers of further topics: the settings are of the topic alone.
+    #: QoS for further topics: the settings apply to the main topic only.
     FURTHER_QOS: ClassVar[QoS] = QoS(
         reliability=Reliability.BEST_AVAILABLE, durability=Durability.BEST_AVAILABLE
     )
@@ -99,11 +99,11 @@ class TopicDisplay(Display):
         then="_schedule",
     )  # fmt: skip
     reliability = Setting(
-        "Topic/Reliability Policy", "enum", BEST_AVAILABLE, "What publishers have to offer.",
+        "Topic/Reliability Policy", "enum", BEST_AVAILABLE, "Reliability to request.",
         choices=list(_RELIABILITY), then="_schedule",
     )  # fmt: skip
     durability = Setting(
-        "Topic/Durability Policy", "enum", BEST_AVAILABLE, "Whether earlier messages are wanted.",
+        "Topic/Durability Policy", "enum", BEST_AVAILABLE, "Durability to request.",
         choices=list(_DURABILITY), then="_schedule",
     )  # fmt: skip
 
@@ -190,7 +190,7 @@ class TopicDisplay(Display):
         return ()
 
     def _resolve_further(self, path: str, topic: str) -> tuple[str, ...]:
-        """Return the absolute name of a topic; none, with a status, for a name that is none.
+        """Return the absolute name of a topic; nothing, and an error status, if it is invalid.
 
         Args:
             path: The setting that names it.
