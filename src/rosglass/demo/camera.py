@@ -79,41 +79,41 @@ class Camera:
 
     def render(self, state: RobotState, *, body: bool = True) -> Picture:
         """Return a new image (rows of RGB) of the view, with the robot itself if `body`."""
-        picture = np.empty((HEIGHT, WIDTH, 3), np.uint8)
+        image = np.empty((HEIGHT, WIDTH, 3), np.uint8)
         rotation, position = pose_of(state)
-        self._draw_sky(picture, state)
-        self._draw_ground(picture, rotation, position)
+        self._draw_sky(image, state)
+        self._draw_ground(image, rotation, position)
         for view in self._walls.views(rotation, position):
-            self._draw(picture, view)
+            self._draw(image, view)
         carrier = Surfaces(faces_of(self._world.carrier(state.carrier_phase)))
         things = self._things.views(rotation, position) + carrier.views(rotation, position)
         things.sort(key=lambda view: -view.distance)
         for view in things:
-            self._draw(picture, view)
+            self._draw(image, view)
         if body:
-            self._draw_body(picture, state)
+            self._draw_body(image, state)
         if state.flashlight:
-            cv2.multiply(picture, self._beam, picture, 1 / 128)
-        return picture
+            cv2.multiply(image, self._beam, image, 1 / 128)
+        return image
 
-    def stamp(self, picture: Picture, nanoseconds: int, number: int) -> None:
+    def stamp(self, image: Picture, nanoseconds: int, number: int) -> None:
         """Burn the clock and the frame code into the image.
 
         Args:
-            picture: The image.
+            image: The image.
             nanoseconds: System time to encode as the time of the image.
             number: The sequence number of the image.
         """
         seconds, rest = divmod(nanoseconds, 1_000_000_000)
         clock = time.strftime("%H:%M:%S", time.localtime(seconds)) + f".{rest // 1_000_000:03d}"
-        strip = picture[HEIGHT - 26 :]
+        strip = image[HEIGHT - 26 :]
         cv2.convertScaleAbs(strip, strip, 0.35)
         at = (8, HEIGHT - 8)
         cv2.putText(
-            picture, clock, at, cv2.FONT_HERSHEY_SIMPLEX, 0.55, (255, 240, 200), 1, cv2.LINE_AA
+            image, clock, at, cv2.FONT_HERSHEY_SIMPLEX, 0.55, (255, 240, 200), 1, cv2.LINE_AA
         )
         cv2.putText(
-            picture,
+            image,
             f"{number % 100000:05d}",
             (144, HEIGHT - 8),
             cv2.FONT_HERSHEY_SIMPLEX,
@@ -122,9 +122,9 @@ class Camera:
             1,
             cv2.LINE_AA,
         )
-        framecode.draw(picture, framecode.FrameCode.at(nanoseconds, number), *CODE_POSITION)
+        framecode.draw(image, framecode.FrameCode.at(nanoseconds, number), *CODE_POSITION)
 
-    def _draw_sky(self, picture: Picture, state: RobotState) -> None:
+    def _draw_sky(self, image: Picture, state: RobotState) -> None:
         pitch = state.pitch + MOUNT[2]
         c, s = math.cos(state.roll), math.sin(state.roll)
         column = (-state.yaw % (2 * math.pi)) * FOCAL - math.radians(39) * FOCAL
@@ -142,12 +142,12 @@ class Camera:
             self._panorama,
             matrix,
             (WIDTH, rows),
-            picture[:rows],
+            image[:rows],
             cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
             cv2.BORDER_REPLICATE,
         )
 
-    def _draw_ground(self, picture: Picture, rotation: Floats, position: Floats) -> None:
+    def _draw_ground(self, image: Picture, rotation: Floats, position: Floats) -> None:
         half_x, half_y = self._world.half_length, self._world.half_width
         origin = np.array([-half_x, half_y, 0.0])
         plane = np.column_stack(
@@ -167,14 +167,14 @@ class Camera:
         # enough, as every texel covers several pixels.
         switch = min(HEIGHT, max(top, int(max(rows)) + 90))
         far, near = self._ground_scale / 2, self._ground_scale
-        _warp(self._ground_far, np.diag([far, far, 1.0]) @ inverse, picture, top, switch)
+        _warp(self._ground_far, np.diag([far, far, 1.0]) @ inverse, image, top, switch)
         if switch < HEIGHT:
             half = np.empty(((HEIGHT - switch + 1) // 2, WIDTH // 2, 3), np.uint8)
             to_texture = np.diag([near, near, 1.0]) @ inverse @ _shift(0, switch) @ _DOUBLE
             _warp(self._ground, to_texture, half, 0, half.shape[0])
-            cv2.resize(half, (WIDTH, HEIGHT - switch), picture[switch:])
+            cv2.resize(half, (WIDTH, HEIGHT - switch), image[switch:])
 
-    def _draw(self, picture: Picture, view: View) -> None:
+    def _draw(self, image: Picture, view: View) -> None:
         x, y, width, height = cv2.boundingRect(view.outline)
         x0, y0 = max(0, x), max(0, y)
         x1, y1 = min(WIDTH, x + width), min(HEIGHT, y + height)
@@ -195,7 +195,7 @@ class Camera:
         )
         mask = np.zeros(patch.shape[:2], np.uint8)
         cv2.fillConvexPoly(mask, view.outline - (x0, y0), 255)
-        cv2.copyTo(patch, mask, picture[y0:y1, x0:x1])
+        cv2.copyTo(patch, mask, image[y0:y1, x0:x1])
 
     def _texture(self, face: Face, distance: float) -> Picture:
         """Return the face's texture, lit, hazy and small enough for its distance."""
@@ -217,11 +217,11 @@ class Camera:
             found = self._shaded[key] = np.clip(mixed, 0, 255).astype(np.uint8)
         return found
 
-    def _draw_body(self, picture: Picture, state: RobotState) -> None:
+    def _draw_body(self, image: Picture, state: RobotState) -> None:
         """Draw the deck and the front flippers, which reach into the image from below."""
         for (front, half, up), color in _DECK:
             deck = [(0.05, half, up), (front, half, up), (front, -half, up), (0.05, -half, up)]
-            self._fill(picture, np.array(deck), color)
+            self._fill(image, np.array(deck), color)
         for side, angle in ((1, state.flippers[0]), (-1, state.flippers[1])):
             c, s = math.cos(angle), math.sin(angle)
             along, thick = _FLIPPER_OUTLINE
@@ -230,23 +230,23 @@ class Camera:
             inner, outer = np.full(4, side * 0.27), np.full(4, side * 0.37)
             belt = [0, 1, 1, 0]
             edge = np.where([True, True, False, False], inner, outer)
-            self._fill(picture, np.column_stack([forward, inner, height]), (50, 53, 60))
-            self._fill(picture, np.column_stack([forward[belt], edge, height[belt]]), (30, 32, 36))
+            self._fill(image, np.column_stack([forward, inner, height]), (50, 53, 60))
+            self._fill(image, np.column_stack([forward[belt], edge, height[belt]]), (30, 32, 36))
             for k in np.linspace(0.12, 0.92, 8):
                 x = forward[0] + k * (forward[1] - forward[0])
                 z = height[0] + k * (height[1] - height[0])
-                self._cleat(picture, (x, side * 0.27, z), (x, side * 0.37, z))
+                self._cleat(image, (x, side * 0.27, z), (x, side * 0.37, z))
 
-    def _cleat(self, picture: Picture, start: tuple[float, ...], end: tuple[float, ...]) -> None:
+    def _cleat(self, image: Picture, start: tuple[float, ...], end: tuple[float, ...]) -> None:
         points = outline_of(from_body(np.array([start, end, end])))
         if points is not None:
             ends = [(int(p[0]), int(p[1])) for p in points[:2]]
-            cv2.line(picture, ends[0], ends[1], (74, 78, 86), 2, cv2.LINE_AA)
+            cv2.line(image, ends[0], ends[1], (74, 78, 86), 2, cv2.LINE_AA)
 
-    def _fill(self, picture: Picture, points: Floats, color: tuple[int, int, int]) -> None:
+    def _fill(self, image: Picture, points: Floats, color: tuple[int, int, int]) -> None:
         outline = outline_of(from_body(points))
         if outline is not None:
-            cv2.fillConvexPoly(picture, outline, color, cv2.LINE_AA)
+            cv2.fillConvexPoly(image, outline, color, cv2.LINE_AA)
 
 
 _DOUBLE = np.array([[2.0, 0, 0.5], [0, 2.0, 0.5], [0, 0, 1.0]])
@@ -256,14 +256,14 @@ def _shift(x: float, y: float) -> Floats:
     return np.array([[1.0, 0, x], [0, 1.0, y], [0, 0, 1.0]])
 
 
-def _warp(texture: Picture, inverse: Floats, picture: Picture, first: int, last: int) -> None:
-    """Fill some rows of `picture` with `texture`; `inverse` leads from pixels to texels."""
+def _warp(texture: Picture, inverse: Floats, image: Picture, first: int, last: int) -> None:
+    """Fill some rows of `image` with `texture`; `inverse` leads from pixels to texels."""
     if last > first:
         cv2.warpPerspective(
             texture,
             inverse @ _shift(0, first),
-            (picture.shape[1], last - first),
-            picture[first:last],
+            (image.shape[1], last - first),
+            image[first:last],
             cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
             cv2.BORDER_REPLICATE,
         )

@@ -85,7 +85,7 @@ class ServiceClient(ClientElement):
     ) -> None:
         super().__init__(runtime, name, type_name, dialect)
         self._qos = qos
-        #: The requests that are no calls of the client yet.
+        #: The requests that the client has not called yet.
         self._early: list[_Request] = []
 
     @property

@@ -56,7 +56,7 @@ _HECTOR_SETTINGS = {
 }
 
 
-#: What shows the same as displays of hector_rviz_plugins, by their class.
+#: Replacements for displays of hector_rviz_plugins, by their class.
 _INSTEAD = {
     "hector_rviz_plugins/GraphDisplay": "nothing replaces it: publish the graph as a MarkerArray",
     "hector_rviz_plugins/MultiRobotModel": "add a RobotModel with a TF Prefix for each robot",

@@ -26,7 +26,7 @@ NO_GPU = (
     "draws with its software renderer. Unset QT_QUICK_BACKEND; without a graphics card, Mesa's "
     "llvmpipe will do (on Debian: sudo apt install libgl1-mesa-dri)."
 )
-#: The longest pause after a picture, in seconds.
+#: The longest pause after a frame, in seconds.
 _MAX_PAUSE_S = 0.5
 #: Renderers of views that are gone, until C++ has deleted them.
 _ORPHANS: list[SceneRenderer] = []
@@ -38,7 +38,7 @@ class FrameScheduler(QtCore.QObject):
     Attributes:
         renderers: Those that C++ still has: letting go of one too early frees it twice.
         began: When the window began its frame, by the clock of :func:`time.monotonic`.
-        next_picture: Before when no other picture is drawn.
+        next_picture: Time before which no other frame is drawn.
 
     Args:
         view: The ``SceneView``.
@@ -50,12 +50,12 @@ class FrameScheduler(QtCore.QObject):
         self.renderers: list[SceneRenderer] = []
         #: The one that draws in the GUI thread, as Qt's basic render loop does; None elsewhere.
         self._drawing: SceneRenderer | None = None
-        #: Pictures that renderers have drawn which are gone.
+        #: Frames drawn by renderers that no longer exist.
         self._painted = 0
         self.began = self.next_picture = 0.0
-        #: Whether a picture of this view is part of the window's frame.
+        #: True if a frame of this view is part of the window's frame.
         self._is_in_frame = False
-        #: Whether a change waits until the next picture.
+        #: True while a change waits until the next frame.
         self._is_late = False
         self._later = QtCore.QTimer(self)
         self._later.setSingleShot(True)
@@ -82,30 +82,30 @@ class FrameScheduler(QtCore.QObject):
         return made
 
     def begin(self) -> None:
-        """Note that a picture of the view becomes part of the window's frame."""
+        """Note that a frame of the view becomes part of the window's frame."""
         if self.draws_in_software != self._view.scene.draws_in_software:
             QtCore.QTimer.singleShot(0, self, self._report_device)
         self._is_in_frame, self._is_late = True, False
 
     @property
     def draws_in_software(self) -> bool:
-        """Whether the processor draws."""
+        """True if the CPU draws."""
         return any(one.draws_in_software for one in self.renderers)
 
     @property
     def is_complete(self) -> bool:
-        """Whether the last picture showed all: new data is uploaded over several pictures."""
+        """True if the last frame showed everything: new data is uploaded over several frames."""
         return all(one.is_complete for one in self.renderers if Shiboken.isValid(one))
 
     @property
     def pictures_drawn(self) -> int:
-        """How many pictures were drawn."""
+        """Number of drawn frames."""
         return self._painted + sum(one.count for one in self.renderers)
 
     def request_picture(self) -> None:
-        """Draw what has changed; where the processor draws, QML has half of the time.
+        """Draw changes; if the CPU draws, QML has half of the time.
 
-        What the user moves is drawn at once.
+        Movements by the user are drawn at once.
         """
         now = time.monotonic()
         if now >= self.next_picture or self._view.is_moved_by_user(now):
@@ -117,7 +117,7 @@ class FrameScheduler(QtCore.QObject):
 
     @Slot()
     def draw(self) -> None:
-        """Draw the next picture; the window once with it, where the GUI thread draws."""
+        """Draw the next frame; if the GUI thread draws, with only one frame of the window."""
         renderer = self._drawing
         if renderer is not None and Shiboken.isValid(renderer) and self._view.isVisible():
             renderer.draw_again()

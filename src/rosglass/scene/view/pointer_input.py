@@ -124,7 +124,7 @@ class PointerInput(QtCore.QObject):
             at = (self._pointed.x(), self._pointed.y())
             self._tools.on_move(PointerEvent(self._view, at, modifiers=modifiers))
             if is_alive(self._view):
-                # What a tool shows of it is no reason to look once more.
+                # A tool's own feedback does not require another look.
                 self._hover.stop()
 
     def wheel(self, event: Any) -> None:

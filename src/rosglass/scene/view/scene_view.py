@@ -55,7 +55,7 @@ __all__ = ["NO_GPU", "SceneView"]
 
 #: Seconds after its last move at which a camera counts as still.
 _STILL_S = 0.2
-#: Seconds that the camera takes to what it is to look at, and milliseconds between two pictures.
+#: Seconds that the camera takes to turn to its goal, and milliseconds between two frames.
 _TURN_S, _TURN_MS = 0.4, 16
 _SCENE_GONE = "The scene was that of another view, which is gone: nothing is shown."
 #: RViz's background.
@@ -85,7 +85,7 @@ class SceneView(QQuickRhiItem):
     configLoading = Signal()
     #: A config was shown: its file, if any.
     configLoaded = Signal(str)
-    #: What is shown was saved to a file.
+    #: The content was saved to a file.
     configSaved = Signal(str)
 
     def __init__(self, parent: Any = None, runtime: Runtime | None = None) -> None:
@@ -97,9 +97,9 @@ class SceneView(QQuickRhiItem):
         #: Whether it showed the scene of another view, which is gone.
         self._scene_is_gone = False
         self._frames = FrameScheduler(self)
-        #: What the view itself draws into the scene: its tools, the marks of what is selected.
+        #: The view's own drawables in the scene: tools, and marks of the selection.
         self.overlay = Group()
-        #: What is selected.
+        #: The selection.
         self._selection = Selection(self, self.overlay, self._drawables, self.camera)
         self.sceneChanged.connect(self._selection.clear)
         self._scene = Scene(self, runtime)
@@ -107,7 +107,7 @@ class SceneView(QQuickRhiItem):
         self.config: RvizConfig | None = None
         #: Whether its view is of an unknown type, and is kept until another one is chosen.
         self._keeps_view = False
-        #: What the program around it keeps in ``Window Geometry`` of configs.
+        #: The surrounding program's entries in ``Window Geometry`` of configs.
         self.window_geometry: dict[str, Any] = {}
         self._view: ViewController = create_view("Orbit")
         self._view.on_change, self._view.on_target = self.camera_moved, self._on_placed
@@ -215,7 +215,7 @@ class SceneView(QQuickRhiItem):
     if TYPE_CHECKING:
         scene: Scene
     else:
-        #: What is shown: its own, or that of another view, which it shows from elsewhere.
+        #: The scene that is shown: its own, or that of another view, seen from elsewhere.
         scene = Property(QtCore.QObject, _get_scene, _set_scene, notify=sceneChanged)
 
     # -- properties ------------------------------------------------------------------------------
@@ -242,7 +242,7 @@ class SceneView(QQuickRhiItem):
             self.backgroundChanged.emit()
             self.update()
 
-    #: What is behind everything; where it is translucent, items below the view shine through.
+    #: The background; where it is translucent, items below the view shine through.
     background = Property(QColor, _get_background, _set_background, notify=backgroundChanged)
 
     def _set_bare(self, bare: bool) -> None:
@@ -286,7 +286,7 @@ class SceneView(QQuickRhiItem):
     #: ``ThirdPersonFollower``, ``FrameAligned``.
     view = Property(str, _get_view_name, _set_view_name, notify=viewChanged)
 
-    #: What is selected.
+    #: The selection.
     selection: Any = Property(QtCore.QObject, lambda self: self._selection, constant=True)
 
     #: The tools: a list, and the current one.
@@ -308,7 +308,7 @@ class SceneView(QQuickRhiItem):
     #: The current tool: its type, e.g. ``Measure``; of an own tool, its name.
     tool = Property(str, _get_tool, _set_tool, notify=toolChanged)
 
-    #: What the current tool says for a status bar, and what tools have done; bold as in HTML.
+    #: The current tool's instructions, and outcomes of tools, for a status bar; bold as in HTML.
     statusText = Property(str, lambda self: self._tools.statusText, notify=statusTextChanged)
 
     # -- displays and tools ----------------------------------------------------------------------
@@ -346,7 +346,7 @@ class SceneView(QQuickRhiItem):
 
     @property
     def controller(self) -> ViewController:
-        """What moves the camera."""
+        """The view controller, which moves the camera."""
         return self._view
 
     def select_view(self, name: str) -> None:
@@ -365,7 +365,7 @@ class SceneView(QQuickRhiItem):
         """Look through another view.
 
         Raises:
-            ArgumentError: It is none.
+            ArgumentError: `view` is not a ViewController.
         """
         if not isinstance(view, ViewController):
             raise ArgumentError("view", view, "a view controller; select_view() takes its type")
@@ -436,7 +436,7 @@ class SceneView(QQuickRhiItem):
         """Save where the camera is, as the last of the saved views.
 
         Raises:
-            ArgumentError: The name is no text.
+            ArgumentError: The name is not a string.
         """
         if not isinstance(name, str):
             raise ArgumentError("name", name, "a text")
@@ -523,7 +523,7 @@ class SceneView(QQuickRhiItem):
             self.scene._refuse(f"SceneView: removeSavedView: {error}")
 
     def pictures_drawn(self) -> int:
-        """Return how many pictures were drawn."""
+        """Return the number of drawn frames."""
         return self._frames.pictures_drawn
 
     # -- config files ----------------------------------------------------------------------------
@@ -598,7 +598,7 @@ class SceneView(QQuickRhiItem):
         self.configSaved.emit(config.source)
 
     def camera(self) -> Camera:
-        """Return the camera of the next picture; its pixels are units of this item."""
+        """Return the camera of the next frame; its pixels are units of this item."""
         goal = self._view.camera(self.width(), self.height())
         if self._turn is None:
             return goal
@@ -636,12 +636,12 @@ class SceneView(QQuickRhiItem):
 
     @property
     def is_complete(self) -> bool:
-        """Whether the last picture showed all: new data is uploaded over several pictures."""
+        """True if the last frame showed everything: new data is uploaded over several frames."""
         return self._frames.is_complete
 
     @property
     def is_loading(self) -> bool:
-        """Whether meshes or other files of what it shows are being read."""
+        """True while meshes or other files of the scene are being read."""
         return is_alive(self._scene) and self._scene.is_loading
 
     def camera_moved(self) -> None:
@@ -674,12 +674,12 @@ class SceneView(QQuickRhiItem):
 
     @property
     def is_moving(self) -> bool:
-        """Whether the camera was moved just now, so that large clouds are thinned out."""
+        """True if the camera was moved just now, so that large clouds are thinned out."""
         return self._still.isActive()
 
     @property
     def is_turning(self) -> bool:
-        """Whether the camera is on its way to what it is to look at."""
+        """True while the camera turns to its goal."""
         return self._turn is not None
 
     def pick(self, x: float, y: float, radius: float = 2.0) -> Hit | None:

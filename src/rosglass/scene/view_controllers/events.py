@@ -1,7 +1,7 @@
-"""What the mouse, the wheel and fingers do in a scene, as plain values.
+"""Events of the mouse, the wheel and fingers in a scene, as plain values.
 
-Lengths are in units of the item that shows the scene. A tool gets an event first, and passes on to
-the view what it does not use itself.
+Lengths are in units of the item that shows the scene. A tool gets an event first; the view gets
+the ones that the tool does not use.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Modifier(enum.IntFlag):
 
 
 class Action(enum.Enum):
-    """What a drag does; the values are the names of RViz's cursors."""
+    """The effect of a drag; the values are the names of RViz's cursors."""
 
     NONE = "cursor"
     ROTATE_3D = "rotate_cam"
@@ -56,7 +56,7 @@ class Drag(NamedTuple):
     """A movement of the mouse with a button held, in units of the item.
 
     Attributes:
-        x: Where it is now, from the left edge.
+        x: Its present position, from the left edge.
         y: The same, from the upper edge.
         dx: How far it has moved to the right since the last event.
         dy: The same, downwards.

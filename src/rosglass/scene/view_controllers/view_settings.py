@@ -70,7 +70,7 @@ class ViewSetting(Generic[_T]):
         """Return a value of a program or of a file as it is kept.
 
         Raises:
-            ArgumentError: It is no value of this setting.
+            ArgumentError: The value is invalid for this setting.
         """
         raise NotImplementedError
 
@@ -114,7 +114,7 @@ class NumberSetting(ViewSetting[float]):
 
 
 class ScaleSetting(NumberSetting):
-    """A number of either sign; negative ones turn the picture by half a turn, as in RViz."""
+    """A number of either sign; negative ones turn the view by half a turn, as in RViz."""
 
     def read(self, value: Any) -> float:
         """Return a number, at least as far from 0 as `low`: RViz draws nothing at 0."""
@@ -208,7 +208,7 @@ def finite_number(value: Any, name: str) -> float:
     """Return a number.
 
     Raises:
-        ArgumentError: It is none, or not finite; the error begins with `name`.
+        ArgumentError: The value is not a finite number; the error begins with `name`.
     """
     try:
         number = math.nan if isinstance(value, bool) else float(value)

@@ -92,7 +92,7 @@ class FocalShape(NamedTuple):
 
 
 class ViewController:
-    """What all views have; :data:`VIEWS` lists them.
+    """Base class of the view controllers, which :data:`VIEWS` lists.
 
     A view follows its target frame, and keeps its settings in it. The scene calls
     :meth:`update_target` before each frame, and draws :meth:`camera`.
@@ -101,21 +101,21 @@ class ViewController:
         class_id: RViz's, e.g. ``rviz/Orbit``; RViz 2's by default.
 
     Attributes:
-        name: Of the view, as saved views have one.
+        name: Name of the view, as saved views have one.
         problem: Why the target frame cannot be followed; empty if it can.
         on_change: Called after each change of a setting.
         on_target: Called after another target frame was chosen.
     """
 
-    #: Of the type, as in RViz's Views panel.
+    #: Name of the type, as in RViz's Views panel.
     TYPE = ""
     #: A sentence about the type.
     DESCRIPTION = ""
 
-    #: What dragging does with the left and the right button, without and with Shift.
+    #: The effect of dragging with the left and the right button, without and with Shift.
     _LEFT = (Action.ROTATE_3D, Action.MOVE_XY)
     _RIGHT = (Action.ZOOM, Action.MOVE_Z)
-    #: For the status bar, without and with Shift.
+    #: Instructions for the status bar, without and with Shift.
     _HELP = ("", "")
 
     near_clip = NumberSetting(
@@ -215,7 +215,7 @@ class ViewController:
             A warning for each value that was ignored, beginning with the setting's name.
 
         Raises:
-            ArgumentError: It is no mapping.
+            ArgumentError: The state is not a mapping.
         """
         if not isinstance(state, Mapping):
             raise ArgumentError("the view", state, "a mapping of settings by name")
@@ -415,11 +415,11 @@ class ViewController:
         """Change the distance to what is seen by a ratio."""
 
     def _pinch(self, ratio: float) -> None:
-        """Enlarge what is seen by a ratio."""
+        """Magnify the view by a ratio."""
         self._zoom(1 / ratio)
 
     def _twist(self, angle: float) -> None:
-        """Turn the picture clockwise by radians."""
+        """Turn the view clockwise by radians."""
 
     # Common parts
 
@@ -458,7 +458,7 @@ class OrbitView(ViewController):
         ),
         "Left-Click: Move X/Y.  Right-Click/Mouse Wheel: Move Z.",
     )
-    #: Of the focal shape, RGBA.
+    #: Color of the focal shape, RGBA.
     _COLOR = (1.0, 1.0, 0.0, 0.5)
 
     distance = NumberSetting("Distance", 10.0, "Distance from the focal point.", 0.001)
@@ -542,7 +542,7 @@ class OrbitView(ViewController):
         sign = -1 if self.invert_z else 1
         self.pitch = sign * math.asin(min(max(z / self.distance, -1.0), 1.0))
         if math.hypot(x, y) <= 1e-6 * self.distance:
-            # From straight above, what is up in the picture says where the camera comes from.
+            # From straight above, the view's up direction gives the camera's yaw.
             x, y, _ = -eye[:3, 1] * math.copysign(sign, z)
         self.yaw = sign * math.atan2(y, x) % math.tau
 
@@ -894,7 +894,7 @@ class TopDownOrthoView(ViewController):
         self.x, self.y = self.x + right, self.y + up
 
     def _zoom(self, ratio: float) -> None:
-        # RViz turns the picture over by a drag of 100 units in one event.
+        # RViz turns the view over by a drag of 100 units in one event.
         self.scale *= max(2 - ratio, 0.01)
 
     def _pinch(self, ratio: float) -> None:
