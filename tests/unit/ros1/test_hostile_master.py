@@ -264,6 +264,13 @@ def test_no_document_type_is_read_in_calls_or_answers(encoding):
         client.parse_xml(call.encode(encoding))
 
 
+@pytest.mark.parametrize("tag", ["<!--", "<a b='", "<?"])
+def test_no_endless_tag_is_read(tag):
+    # 60 MB of it are one step of the parser, for which all threads would wait 1.5 s.
+    with pytest.raises(ExpatError, match="a tag or comment of more than"):
+        client.parse_xml(b"<a>" + tag.encode() + b"x" * 2_000_000)
+
+
 def test_a_call_that_drips_ends_when_the_node_is_closed():
     asked = threading.Event()
 

@@ -39,6 +39,10 @@ _MAX_DEPTH = 100
 _MAX_ELEMENTS = 100_000
 #: Parsing keeps Python busy: texts of a hundred peers, parsed at once, would stop the interface.
 _parsing = threading.Lock()
+#: Bytes that are parsed at once: no other thread runs until then. A tag or comment is parsed again
+#: with each part that belongs to it.
+_PART_BYTES = 64 * 1024
+_MAX_TAG_BYTES = 4 * _PART_BYTES
 #: Errors of a kept connection that the peer has closed.
 _STALE = (http.client.RemoteDisconnected, ConnectionResetError, BrokenPipeError)
 
@@ -77,7 +81,11 @@ def parse_xml(data: bytes, max_elements: int = _MAX_ELEMENTS) -> tuple[tuple[Any
     parser.StartElementHandler, parser.EndElementHandler = start, target.end
     parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = target.data, _refuse_document_type
     with _parsing if max_elements < sys.maxsize else nullcontext():
-        parser.Parse(data, True)
+        for begin in range(0, len(data), _PART_BYTES):
+            parser.Parse(data[begin : begin + _PART_BYTES], False)
+            if begin - parser.CurrentByteIndex > _MAX_TAG_BYTES:
+                raise ExpatError(f"a tag or comment of more than {_MAX_TAG_BYTES} bytes")
+        parser.Parse(b"", True)
         return target.close(), target.getmethodname()
 
 
