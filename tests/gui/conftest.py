@@ -83,7 +83,7 @@ class Bench:
         self.session, self.engine, self.world, self.folder = session, engine, world, folder
         self.module = "Ros2 1.0"
         self.robot: Any = world.connect(None, "robot")
-        self._roots: list[Any] = []
+        self.roots: list[Any] = []
         self._count = 0
 
     def load(self, body: str, imports: str = "") -> QObject:
@@ -102,7 +102,7 @@ class Bench:
         component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(file)))
         root = component.create()
         assert root is not None, component.errorString()
-        self._roots += [root, component]
+        self.roots += [root, component]
         return root
 
     def run(self, script: str, imports: str = "") -> Any:
@@ -117,7 +117,7 @@ class Bench:
     def close(self) -> None:
         from rosglass.qt import is_alive
 
-        for item in self._roots:
+        for item in self.roots:
             if is_alive(item):
                 item.deleteLater()
         self.session.close()

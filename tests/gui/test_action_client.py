@@ -348,13 +348,17 @@ def test_the_type_is_the_servers(live: Bench, counter: Counter, wait: Any) -> No
     wait(lambda: root.property("count") == 6)
 
 
+def goal_of(client: Client) -> Any:
+    """Return the goal that a handle in QML stands for."""
+    return client.root.property("handle")._goal
+
+
 def test_goal_of_a_lost_server_ends(client: Client, counter: Counter, wait: Any) -> None:
     counter.offer()
     wait(lambda: client.run("client.ready"))
     client.run("send(50)")
     client.until("feedback")
-    goal = client.root.property("handle")._goal
-    goal.close()  # as when its server is lost
+    goal_of(client).close()  # as when its server is lost
     assert client.until("result")[:3] == [True, 0, None]
     assert client.run("[handle.status, handle.isActive]") == [0, False]
     assert client.of("status")[-1] == [0]
@@ -418,7 +422,7 @@ def test_goals_leave_nothing_behind(
     goals = []
     for _ in range(3):
         client.run("log = []; send(3)")
-        goals.append(weakref.ref(client.root.property("handle")._goal))
+        goals.append(weakref.ref(goal_of(client)))
         client.until("result")
     client.run("handle = null; log = []; 0")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from inside import has_seen_the_loop, root_of
 from local_world import LocalWorld
 
 from rosglass.qml import Session
@@ -56,9 +57,9 @@ def runner(app: Any, tmp_path: Path, caplog: Any, wait: Callable[..., None]) -> 
     runner.operator = Operator()
     runner.engine.rootContext().setContextProperty("operator", runner.operator)
     runner.load()
-    runner.operator.root = runner._live.made.root
+    runner.operator.root = root_of(runner)
     # Until the event loop is known to run, only JavaScript is looked at.
-    wait(lambda: session.shared[Watchdog]._lives)
+    wait(lambda: has_seen_the_loop(session.shared[Watchdog]))
     yield runner
     runner.close()
     session.close()

@@ -393,7 +393,7 @@ def test_messages_waiting_for_their_topic_are_sent_after_the_engine(
     )
     assert other.run(script) is True
     assert received == []
-    for item in (*other._roots, engine):
+    for item in (*other.roots, engine):
         item.deleteLater()
     send_deferred_deletes()
     wait(lambda: received == ["last"])

@@ -8,6 +8,8 @@ import time
 from typing import Any
 
 import pytest
+from inside import endpoint_of
+from receiving import inbox_of
 from waiting import eventually
 
 from rosglass.comm import ConnectionState, QoS, Sample, Time
@@ -708,11 +710,11 @@ def test_a_message_that_has_waited_for_a_screen_that_stood_still_is_as_old_as_it
     wait(chat.subscription_count)
     chat.publish(data="before")
     wait(lambda: "before" in root.shown())
-    endpoint = root.property("sub")._endpoint
+    endpoint = endpoint_of(root.property("sub"))
     received = endpoint.statistics().received
     chat.publish(data="waiting")
     # The screen stands still.
     eventually(lambda: endpoint.statistics().received > received)
-    endpoint._inbox._last_time -= 30
+    inbox_of(endpoint)._last_time -= 30
     wait(lambda: "waiting" in root.shown())
     assert root.shown() == "before false false,waiting true true"

@@ -6,6 +6,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from inside import has_seen_the_loop, root_of
 from local_world import LocalWorld
 
 from rosglass.errors import Error
@@ -70,11 +71,6 @@ class Helper(QtCore.QObject):
         self.changed.emit()
 
 
-def root_of(runner: Runner) -> Any:
-    """Return the root object of the interface that runs."""
-    return runner._live.made.root
-
-
 @pytest.fixture
 def run(
     app: Any, tmp_path: Path, caplog: Any, wait: Callable[..., None]
@@ -94,7 +90,7 @@ def run(
         runner.load()
         runner.root = root_of(runner)
         # Until the event loop is known to run, only JavaScript is looked at.
-        wait(lambda: session.shared[Watchdog]._lives)
+        wait(lambda: has_seen_the_loop(session.shared[Watchdog]))
         return runner
 
     yield run

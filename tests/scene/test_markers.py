@@ -750,9 +750,13 @@ def test_meshes_that_are_kept_are_bounded() -> None:
     for done in waiting:
         done(Error("gone"))
     assert len(loaded) == 1000
-    assert len(meshes._files) == 200
+    # The latest 200 are kept.
+    for number in range(800, 1000):
+        of(number)
+    assert len(waiting) == 1000
+    of(799)
     of(1000)
-    assert len(waiting) == 1001
+    assert len(waiting) == 1002
 
 
 def mesh_file(triangles: int) -> Any:
@@ -792,7 +796,10 @@ def test_bytes_of_meshes_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = [draw("1"), draw("2")]
     for name in "3456":
         draw(name)
-    assert list(meshes._files) == ["5", "6"]
+    done.clear()
+    for uri in "564":
+        list(meshes.of(MarkerRecord(("", 1), MESH, ADD, resource=uri)))
+    assert list(done) == ["4"], "the others are kept"
     assert set(problems.values()) == {""}
     draw("large", 300)
     assert problems.pop("large") == (

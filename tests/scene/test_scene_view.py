@@ -12,7 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from inside import device_of, endpoint_of, queue_of, renderers_of, runtime_of
+from inside import (
+    device_of,
+    endpoint_of,
+    frames_of,
+    on_device,
+    queue_of,
+    renderers_of,
+    runtime_of,
+    watch_frames,
+    watch_uploads,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -1100,9 +1110,10 @@ def test_the_first_frame_may_be_announced_with_further_ones(bench: SceneBench) -
     bench.wait(lambda: view.acceptedMouseButtons() == Qt.MouseButton.AllButtons)
     bench.wait.nothing_happens(0.1)
     # The view still follows the frames of its window, by which it leaves time to QML.
-    began = view._frames.began
+    frames = frames_of(view)
+    began = frames.began
     view.update()
-    bench.wait(lambda: view._frames.began > began)
+    bench.wait(lambda: frames.began > began)
 
 
 def test_the_whole_is_drawn_after_a_move_whose_timer_ends_early(
@@ -1111,13 +1122,8 @@ def test_the_whole_is_drawn_after_a_move_whose_timer_ends_early(
     view = bench.load("AxesDisplay {}")
     bench.picture()
     (renderer,) = renderers_of(view)
-    take, frames = renderer._take_frame, []
-
-    def watched() -> Any:
-        frames.append(take())
-        return frames[-1]
-
-    monkeypatch.setattr(renderer, "_take_frame", watched)
+    frames: list[Any] = []
+    watch_frames(monkeypatch, renderer, frames.append)
     view.camera_moved()
     # Qt's timers may end 5 % early; this one ends much earlier, so that it always does.
     view._still.start(1)
@@ -1143,20 +1149,17 @@ def test_new_drawables_are_uploaded_over_several_frames(
 
     view = bench.load()
     bench.picture()
-    (renderer,) = view._frames.renderers
+    (renderer,) = renderers_of(view)
     shown: list[tuple[int, bool]] = []
-    prepare = renderer._prepare
-
-    def watched(*args: Any) -> Any:
-        found = prepare(*args)
-        shown.append((len(renderer._on_device), renderer.is_complete))
-        return found
-
     clock = itertools.count()
-    monkeypatch.setattr(renderer, "_prepare", watched)
+    watch_uploads(
+        monkeypatch,
+        renderer,
+        lambda: shown.append((len(on_device(renderer)), renderer.is_complete)),
+    )
     # Each upload takes as long as the budget.
     monkeypatch.setattr(module.time, "perf_counter", lambda: float(next(clock)))
-    before = len(renderer._on_device)
+    before = len(on_device(renderer))
     boxes = boxes_in_a_row(4)
     view.scene.root.add(*boxes)
     assert view.is_complete
@@ -1181,16 +1184,13 @@ def test_displays_upload_what_is_new_in_turns(
     many, few = boxes_in_a_row(40), boxes_in_a_row(2)
     robot, path = Group(Group(*many)), Group(*few)
     (renderer,) = renderers_of(view)
-    shown: list[tuple[int, int]] = []
-    prepare = renderer._prepare
-
-    def watched(*args: Any) -> Any:
-        found = prepare(*args)
-        shown.append(tuple(len(set(one) & set(renderer._on_device)) for one in (many, few)))
-        return found
-
+    shown: list[tuple[int, ...]] = []
     clock = itertools.count()
-    monkeypatch.setattr(renderer, "_prepare", watched)
+    watch_uploads(
+        monkeypatch,
+        renderer,
+        lambda: shown.append(tuple(len(on_device(renderer) & {*one}) for one in (many, few))),
+    )
     # Each upload takes as long as the budget.
     monkeypatch.setattr(module.time, "perf_counter", lambda: float(next(clock)))
     view.scene.root.add(robot, path)
@@ -1238,17 +1238,15 @@ def test_texts_removed_during_drawing_hide_nothing(
     view.scene.root.add(labels)
     bench.picture()
     (renderer,) = renderers_of(view)
-    take, problems = renderer._take_frame, []
+    problems: list[Any] = []
 
-    def take_late() -> Any:
-        frame = take()
+    def remove(_: Any) -> None:
         if labels.count:
             # Another thread draws then, or the next frame waits, for QML is to have its time.
-            view._frames.next_picture = time.monotonic() + 60
+            frames_of(view).next_picture = time.monotonic() + 60
             labels.set_texts([], [])
-        return frame
 
-    monkeypatch.setattr(renderer, "_take_frame", take_late)
+    watch_frames(monkeypatch, renderer, remove)
     monkeypatch.setattr(renderer, "_on_problem", problems.append)
     bench.picture()
     assert not labels.count

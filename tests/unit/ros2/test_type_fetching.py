@@ -564,7 +564,7 @@ def test_nothing_is_left_behind(
 
 
 def test_a_message_that_is_a_service_is_not_asked_for_for_ever(
-    join: Callable[..., Ros2Node], eventually: Callable[..., Any]
+    join: Callable[..., Ros2Node], eventually: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A confused publisher: its type exists, but cannot be published."""
     join("robot", robot_library())
@@ -574,9 +574,8 @@ def test_a_message_that_is_a_service_is_not_asked_for_for_ever(
     subscription = user.create_subscription("/ask", callback=print)
     use(user, ASK, hash_of(ASK), "robot")
     eventually(lambda: subscription.problem)
-    rounds = []
-    monkey = user._fetcher._round
-    user._fetcher._round = lambda: rounds.append(monkey())
+    rounds, go_on = [], TypeFetcher._round
+    monkeypatch.setattr(TypeFetcher, "_round", lambda self: rounds.append(go_on(self)))
     nothing_happens(0.5)
     assert len(rounds) < 20
 

@@ -769,10 +769,10 @@ def test_the_cache_returns_what_was_parsed(cache: Path, monkeypatch: pytest.Monk
     elsewhere = load_mesh_cached(data, "file:///c/b.dae")  # with a texture of its own
     assert (parsed[0].texture, elsewhere[0].texture) == ("file:///a/wood.png", "file:///c/wood.png")
     embedded = [MeshPart(parsed[0].positions, parsed[0].normals, texture=b"\x89PNG")]
-    meshes._Cache(os.fspath(cache)).put("embedded", embedded)
+    meshes.MeshCache(os.fspath(cache)).put("embedded", embedded)
     forbid_parsing(monkeypatch)
     assert same(load_mesh_cached(data, "file:///a/b.dae"), parsed)
-    assert same(meshes._Cache(os.fspath(cache)).get("embedded") or (), embedded)
+    assert same(meshes.MeshCache(os.fspath(cache)).get("embedded") or (), embedded)
 
 
 def test_the_cache_follows_the_materials_of_obj_files(cache: Path, tmp_path: Path) -> None:
@@ -809,7 +809,7 @@ def test_damaged_entries_are_parsed_again(cache: Path, damage: str) -> None:
             np.savez(file, **arrays | {"indices0": arrays["indices0"] + 100})
     assert same(load_mesh_cached(data, "a.dae"), parsed)
     (entry,) = cache.iterdir()
-    assert same(meshes._Cache(os.fspath(cache)).get(entry.stem) or (), parsed)
+    assert same(meshes.MeshCache(os.fspath(cache)).get(entry.stem) or (), parsed)
 
 
 def test_a_compressed_entry_is_not_unpacked(cache: Path) -> None:

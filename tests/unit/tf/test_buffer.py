@@ -452,7 +452,8 @@ def test_lookups_of_frames_that_nothing_connects_share_what_they_find() -> None:
     for chain in range(3):
         for number in range(1500):
             put(buffer, f"chain{chain}_{number}", f"chain{chain}_{number + 1}")
-    caches = buffer._store.caches = Counting(buffer._store.caches)
+    store = buffer._store
+    caches = store.caches = Counting(store.caches)
     frames = [one for one in buffer.frame_names() if one not in ("map", "odom")]
     for target in ("map", "chain0_1400"):
         caches.looks = 0

@@ -132,7 +132,7 @@ def load_mesh_cached(
     content, name, base = _content(data, name)
     if ending_of(base) == ".gltf":  # of several files
         return _parsed(content, name, base, read)
-    cache = _Cache(system_cache_folder("meshes"))
+    cache = MeshCache(system_cache_folder("meshes"))
     key = _cache_key(content, name, base, read)
     parts = cache.get(key)
     if parts is None:
@@ -249,7 +249,7 @@ def _cache_key(content: bytes, name: str, base: str, read: Callable[[str], bytes
     return digest.hexdigest()
 
 
-class _Cache:
+class MeshCache:
     """Parsed meshes, a file for each; what fails only costs time."""
 
     def __init__(self, folder: str) -> None:
