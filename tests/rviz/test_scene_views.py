@@ -8,11 +8,13 @@ import pytest
 import yaml
 
 from rosglass.scene.view_controllers.events import Button, Drag, Modifier, Wheel
-from rosglass.scene.view_controllers.views import VIEWS, ViewController, create_view
+from rosglass.scene.view_controllers.views import VIEWS, create_view
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
+
+    from rosglass.scene.view_controllers.view_controller import ViewController
 
 NONE, SHIFT = Modifier.NONE, Modifier.SHIFT
 #: Button, modifiers, and how far the mouse goes in each of two events.

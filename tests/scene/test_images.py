@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import os
+import subprocess
+import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -510,7 +513,7 @@ def test_displays_of_one_name_are_hidden_one_by_one(
 def test_the_matrix_of_ros_1_is_a_capital(ros: int) -> None:
     pytest.importorskip("PySide6")
     from rosglass.messages import load
-    from rosglass.scene.displays.image import _read_lens
+    from rosglass.scene.displays.camera import _read_lens
 
     kind = load("sensor_msgs/msg/CameraInfo", ros=ros)
     lens = _read_lens(kind({"width": 4, "height": 3, "P" if ros == 1 else "p": P}))
@@ -573,3 +576,32 @@ def test_many_panels_are_in_the_window_and_can_be_closed(
     assert not display.enabled
     assert not shown.isVisible()
     assert "cannot be used yet" not in caplog.text
+
+
+@pytest.mark.parametrize("display", ["Camera", "Image"])
+def test_one_display_of_images_brings_all_types_of_their_panel(display: str) -> None:
+    # In a process of its own, which has loaded no other displays: types come with the first use.
+    code = (
+        "from rosglass.scene import Scene\n"
+        "from rosglass.scene.app.modules import register_window\n"
+        "from PySide6.QtQml import QQmlComponent, QQmlEngine\n"
+        "from PySide6.QtGui import QGuiApplication\n"
+        "app = QGuiApplication([])\n"
+        "register_window()\n"
+        f"Scene.TYPES[{display!r}]\n"
+        "engine = QQmlEngine()\n"
+        "component = QQmlComponent(engine)\n"
+        "text = b'import QtQuick; import RosScene 1.0; Item { CameraView {} PictureItem {} }'\n"
+        "component.setData(text, '')\n"
+        "print(component.errorString() or 'ready')\n"
+    )
+    env = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.stdout == "ready\n", done.stderr

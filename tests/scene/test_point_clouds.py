@@ -653,7 +653,7 @@ def test_a_bad_depth_image_is_an_error_in_words(
 
 
 def test_a_depth_cloud_keeps_its_topics_in_files() -> None:
-    from rosglass.scene.displays.point_cloud import DepthCloudDisplay
+    from rosglass.scene.displays.depth_cloud import DepthCloudDisplay
 
     display = DepthCloudDisplay()
     saved = {
@@ -737,14 +737,14 @@ def test_the_brightness_of_hidden_points_is_half(bench: SceneBench) -> None:
 
 @pytest.mark.parametrize("end", ["", "/compressedDepth"])
 def test_the_calibration_is_beside_the_images_of_any_transport(end: str) -> None:
-    from rosglass.scene.displays.point_cloud import DepthCloudDisplay
+    from rosglass.scene.displays.depth_cloud import DepthCloudDisplay
 
     topics = DepthCloudDisplay().further_topics(f"/camera/depth/image_raw{end}")
     assert topics == ("/camera/depth/camera_info",)
 
 
 def test_occlusion_compensation_is_kept_in_files() -> None:
-    from rosglass.scene.displays.point_cloud import DepthCloudDisplay
+    from rosglass.scene.displays.depth_cloud import DepthCloudDisplay
 
     display = DepthCloudDisplay()
     saved = {
@@ -762,7 +762,7 @@ def test_occlusion_compensation_is_kept_in_files() -> None:
 def test_a_depth_image_of_either_ros_is_a_cloud(ros: int) -> None:
     from rosglass.errors import Error
     from rosglass.messages import load
-    from rosglass.scene.displays.point_cloud import DepthCloudDisplay
+    from rosglass.scene.displays.depth_cloud import DepthCloudDisplay
 
     def received(name: str, value: dict[str, Any]) -> Any:
         kind = load(f"sensor_msgs/msg/{name}", ros=ros)

@@ -1346,10 +1346,10 @@ def test_mistakes_in_qml_are_errors_that_name_the_line(
 ) -> None:
     from PySide6.QtCore import QUrl
 
-    from rosglass.scene.displays import declared, image
+    from rosglass.scene.displays import camera, declared
 
     monkeypatch.setattr(declared, "_PLACED_MS", 50)
-    monkeypatch.setattr(image, "_HIDDEN_CHECK_MS", 50)
+    monkeypatch.setattr(camera, "_HIDDEN_CHECK_MS", 50)
     file = tmp_path / "Mistakes.qml"
     file.write_text(
         "import QtQuick\n"

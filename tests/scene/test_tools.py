@@ -1045,7 +1045,7 @@ def test_an_own_tool_may_fail_when_it_is_selected_or_not(
 ) -> None:
     from rosglass.scene.tools.tool import Tool
 
-    monkeypatch.setattr("rosglass.scene.tools.tool._OUTCOME_MS", 100)
+    monkeypatch.setattr("rosglass.scene.tools.tool_manager._OUTCOME_MS", 100)
 
     class Broken(Tool):
         NAME = "Broken"

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from rosglass.scene.displays.scene import Scene
     from rosglass.scene.displays.topic_display import TopicDisplay
     from rosglass.scene.overlays.scene_overlay import SceneOverlay, add_overlay
-    from rosglass.scene.tools.tool import PointerEvent, Tool
+    from rosglass.scene.tools.pointer_event import PointerEvent
+    from rosglass.scene.tools.tool import Tool
     from rosglass.scene.view.scene_view import SceneView
 
 __all__ = [

@@ -31,7 +31,7 @@ from rosglass.scene.configs.rviz_formats import DISPLAYS as DISPLAY_IDS
 from rosglass.scene.configs.rviz_formats import TOOLS as TOOL_IDS
 from rosglass.scene.configs.rviz_formats import VIEWS as VIEW_IDS
 from rosglass.scene.configs.rviz_formats import class_id_of, display_type, tool_type, view_type
-from rosglass.scene.tools.tool import Tools
+from rosglass.scene.tools.tool_manager import Tools
 from rosglass.scene.view_controllers.views import VIEWS, TopDownOrthoView
 
 if TYPE_CHECKING:

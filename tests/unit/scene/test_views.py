@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -18,10 +18,12 @@ from rosglass.scene.view_controllers.views import (
     OrbitView,
     ThirdPersonFollowerView,
     TopDownOrthoView,
-    ViewController,
     XYOrbitView,
     create_view,
 )
+
+if TYPE_CHECKING:
+    from rosglass.scene.view_controllers.view_controller import ViewController
 
 SIZE = (800.0, 600.0)
 LEFT, RIGHT, MIDDLE = Button.LEFT, Button.RIGHT, Button.MIDDLE

@@ -22,7 +22,8 @@ from rosglass.scene.tools.publishing_tools import (
     SetGoalTool,
     SetInitialPoseTool,
 )
-from rosglass.scene.tools.tool import Tool, Tools
+from rosglass.scene.tools.tool import Tool
+from rosglass.scene.tools.tool_manager import Tools
 from rosglass.scene.tools.view_tools import (
     FocusCameraTool,
     InteractTool,
@@ -42,8 +43,8 @@ __all__ = ["DISPLAYS", "TOOLS", "load_types", "register", "register_window"]
 DISPLAYS = {
     "AccelStamped": "displays.geometry",
     "Axes": "displays.grid",
-    "Camera": "displays.image",
-    "DepthCloud": "displays.point_cloud",
+    "Camera": "displays.camera",
+    "DepthCloud": "displays.depth_cloud",
     "Effort": "displays.effort",
     "FluidPressure": "displays.point_cloud",
     "Grid": "displays.grid",
@@ -79,9 +80,12 @@ DISPLAYS = {
 _NOT_IN_QML = ("Group", "rosglass/QmlOverlay")
 #: Types of QML that come with a module of displays, and their classes.
 _ITEMS = {
-    "displays.image": {"CameraView": "CameraView", "PictureItem": "PictureItem"},
+    "displays.camera": {"CameraView": "CameraView"},
+    "displays.image": {"PictureItem": "PictureItem"},
     "overlays.qml_overlay": {"SceneOverlay": "OverlayElement"},
 }
+#: Modules that come with another one: ``ImagePanel.qml`` has the types of both.
+_PARTNERS = {"displays.camera": ("displays.image",), "displays.image": ("displays.camera",)}
 #: The tools; in QML, each has the name of its class; ``Tool`` is the base of own ones.
 TOOLS = (
     FocusCameraTool,
@@ -106,7 +110,8 @@ class _DisplayTypes(Mapping[str, "type[Display]"]):
 
     def __getitem__(self, name: str) -> type[Display]:
         module = DISPLAYS[name]
-        _load(module)
+        for one in (module, *_PARTNERS.get(module, ())):
+            _load(one)
         found: type[Display] = getattr(_import(module), _class_name(name))
         return found
 

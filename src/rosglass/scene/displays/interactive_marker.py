@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from rosglass.scene.data.resource_retriever import ResourceRetriever
     from rosglass.scene.displays.scene import Scene
     from rosglass.scene.render.camera import Camera
-    from rosglass.scene.tools.tool import PointerEvent
+    from rosglass.scene.tools.pointer_event import PointerEvent
 
 
 __all__ = ["InteractiveMarkersDisplay"]

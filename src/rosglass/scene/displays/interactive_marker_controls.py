@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
     from rosglass.scene.displays.interactive_marker import InteractiveMarkersDisplay
     from rosglass.scene.render.camera import Camera
-    from rosglass.scene.tools.tool import PointerEvent
+    from rosglass.scene.tools.pointer_event import PointerEvent
 
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""The displays of point clouds: PointCloud2, PointCloud, LaserScan, DepthCloud, measured values.
+"""The displays of point clouds: PointCloud2, PointCloud, LaserScan, measured values.
 
 The node's thread reads a message as a :class:`~rosglass.scene.data.point_clouds.Cloud` and
 prepares its vertices; the GUI thread places it and sets a few numbers of the shader.
@@ -7,10 +7,6 @@ prepares its vertices; the GUI thread places it and sets a few numbers of the sh
 
 from __future__ import annotations
 
-import math
-import threading
-import time
-from collections import deque
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
@@ -18,20 +14,15 @@ import numpy as np
 
 from rosglass.comm.time import Time
 from rosglass.errors import Error, TransformException
-from rosglass.images.compressed import decompress, decompress_depth
-from rosglass.images.transports import camera_info_topic
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import Slot
 from rosglass.scene.configs.settings import Setting, rgb_of
 from rosglass.scene.data.cloud_sources import (
-    OcclusionBuffer,
     cloud_from_columns,
-    cloud_from_depth_image,
     cloud_from_laser_scan,
     cloud_from_point_cloud,
 )
 from rosglass.scene.data.point_clouds import Cloud, CloudHistory, is_ordered, order_points
-from rosglass.scene.displays.message_queue import drop_oldest, frame_and_stamp
 from rosglass.scene.displays.topic_display import TopicDisplay
 from rosglass.scene.render.drawing import Points
 from rosglass.scene.render.point_colors import (
@@ -59,20 +50,25 @@ if TYPE_CHECKING:
     from rosglass.scene.render.point_colors import ColorTransformer, PointColors
 
 __all__ = [
-    "DepthCloudDisplay",
+    "MAX_SIZE_M",
+    "METRIC_STYLES",
+    "CloudDisplay",
+    "ColorSettings",
     "FluidPressureDisplay",
     "IlluminanceDisplay",
     "LaserScanDisplay",
     "PointCloud2Display",
     "PointCloudDisplay",
+    "PreparedCloud",
     "RelativeHumidityDisplay",
     "TemperatureDisplay",
+    "size_setting",
 ]
 
 #: The largest value of a float32, which is what shaders compute with.
 _MAX_FLOAT = 3e38
 #: Largest size of points in metres and in pixels.
-_MAX_SIZE_M, _MAX_SIZE_PX = 1000.0, 256.0
+MAX_SIZE_M, _MAX_SIZE_PX = 1000.0, 256.0
 #: Most points of one cloud: more do not fit into a buffer of the GPU.
 _MAX_POINTS = 20_000_000
 #: Seconds that one turn of a laser scanner may take.
@@ -80,16 +76,15 @@ _MAX_SCAN_S = 10.0
 #: Metres, or half of the radians, up to which a scanner has not moved during a scan.
 _STILL = 1e-5
 
-
 #: Conditions of settings: the color transformers and styles that they belong to.
 _INTENSITY = {"wanted_transformer": "Intensity"}
 _AXIS_COLOR = {"wanted_transformer": "AxisColor"}
 _RAINBOW = {**_INTENSITY, "useRainbow": True}
 _TWO_COLORS = {**_INTENSITY, "useRainbow": False}
-_METRIC = {"style": ("Squares", "Flat Squares", "Spheres", "Boxes")}
+METRIC_STYLES = {"style": ("Squares", "Flat Squares", "Spheres", "Boxes")}
 
 
-class _Prepared(NamedTuple):
+class PreparedCloud(NamedTuple):
     """A cloud that is ready to be drawn.
 
     Attributes:
@@ -115,7 +110,7 @@ class _Prepared(NamedTuple):
     hidden: int = 0
 
 
-class _ColorSettings(NamedTuple):
+class ColorSettings(NamedTuple):
     """The settings of colors of a display, as values for the node's thread.
 
     Attributes:
@@ -129,7 +124,7 @@ class _ColorSettings(NamedTuple):
     transformers: dict[str, ColorTransformer]
     orders_points: bool
 
-    def prepare(self, cloud: Cloud) -> _Prepared:
+    def prepare(self, cloud: Cloud) -> PreparedCloud:
         """Return a cloud with everything that depends on each of its points."""
         if cloud.point_count > _MAX_POINTS:
             raise Error(
@@ -148,7 +143,7 @@ class _ColorSettings(NamedTuple):
             shape, strides = (vertices.count,), (vertices.stride,)
             alpha = np.ndarray(shape, np.uint8, vertices.data, vertices.channel + 3, strides)
             is_translucent = int(alpha.min()) < 255
-        return _Prepared(cloud, name, vertices, colors, is_translucent)
+        return PreparedCloud(cloud, name, vertices, colors, is_translucent)
 
 
 class _ShownCloud:
@@ -161,17 +156,17 @@ class _ShownCloud:
 
     def __init__(self, display: CloudDisplay) -> None:
         self.points, self.display = Points(), display
-        self._data: _Prepared | None = None
+        self._data: PreparedCloud | None = None
         self._pose: NDArray[np.float64] = np.eye(4)
         self._frame = ""
 
-    def set_cloud(self, data: _Prepared, pose: NDArray[np.float64], frame: str) -> None:
+    def set_cloud(self, data: PreparedCloud, pose: NDArray[np.float64], frame: str) -> None:
         """Take a cloud, its pose in the fixed frame, and its frame."""
         self._data, self._pose, self._frame = data, pose, frame
         self.points.pose = pose
         self._set_vertices(data)
 
-    def _set_vertices(self, data: _Prepared) -> None:
+    def _set_vertices(self, data: PreparedCloud) -> None:
         vertices = data.vertices
         self.points.set_data(
             vertices.data,
@@ -183,7 +178,7 @@ class _ShownCloud:
             box=data.cloud.bounds(),
         )
 
-    def restyle(self, settings: _ColorSettings) -> PointColors | None:
+    def restyle(self, settings: ColorSettings) -> PointColors | None:
         """Apply the display's settings, and return the colors."""
         data, display = self._data, self.display
         if data is None:
@@ -264,10 +259,11 @@ def _invert(default: bool) -> Setting:
     return Setting("Invert Rainbow", "bool", default, text, shown_if=_RAINBOW)
 
 
-def _size(**conditions: Any) -> Setting:
+def size_setting(**conditions: Any) -> Setting:
+    """Return the setting of the size of points in metres, shown under these conditions, too."""
     return Setting(
         "Size (m)", "float", 0.01, "Size of points in metres.", min=0.0001,
-        max=_MAX_SIZE_M, shown_if={**_METRIC, **conditions},
+        max=MAX_SIZE_M, shown_if={**METRIC_STYLES, **conditions},
     )  # fmt: skip
 
 
@@ -280,9 +276,9 @@ class CloudDisplay(TopicDisplay):
     selectable = Setting("Selectable", "bool", True, "Let points be selected.")
     style = Setting(
         "Style", "enum", "Flat Squares", "How points are drawn.",
-        choices=["Points", *_METRIC["style"]],
+        choices=["Points", *METRIC_STYLES["style"]],
     )  # fmt: skip
-    size = _size()
+    size = size_setting()
     sizePixels = Setting(
         "Size (Pixels)", "float", 3.0, "Size of points in pixels.", min=1.0, max=_MAX_SIZE_PX,
         shown_if={"style": "Points"},
@@ -351,7 +347,7 @@ class CloudDisplay(TopicDisplay):
     ) -> None:
         self._history = CloudHistory()
         self._shown: dict[CloudEntry, _ShownCloud] = {}
-        self._colors: _ColorSettings | None = None
+        self._colors: ColorSettings | None = None
         super().__init__(parent, runtime)
 
     def placeholder(self, path: str) -> str:
@@ -385,7 +381,7 @@ class CloudDisplay(TopicDisplay):
         read, settings = type(self).READ, self._color_settings()
         return lambda message: settings.prepare(read(message))
 
-    def _color_settings(self) -> _ColorSettings:
+    def _color_settings(self) -> ColorSettings:
         transformers: dict[str, ColorTransformer] = {
             "AxisColor": AxisColor(
                 self.axis,
@@ -410,7 +406,7 @@ class CloudDisplay(TopicDisplay):
             "RGBF32": RgbF32(),
         }
         in_software = self.scene is not None and self.scene.draws_in_software
-        return _ColorSettings(self.colorTransformer, transformers, in_software)
+        return ColorSettings(self.colorTransformer, transformers, in_software)
 
     # -- in the GUI thread -----------------------------------------------------------------------
 
@@ -436,7 +432,7 @@ class CloudDisplay(TopicDisplay):
         self._set_warning("Cloud", data.cloud.warnings)
         self._count_points()
 
-    def _point_size(self, data: _Prepared) -> tuple[float, bool]:  # noqa: ARG002 - for subclasses
+    def _point_size(self, data: PreparedCloud) -> tuple[float, bool]:  # noqa: ARG002 - for subclasses
         """Return the size of points, and whether it is multiplied with their depth."""
         return (self.sizePixels if self.style == "Points" else self.size), False
 
@@ -448,7 +444,7 @@ class CloudDisplay(TopicDisplay):
             last.points.remove()
         return last
 
-    def _current_settings(self) -> _ColorSettings:
+    def _current_settings(self) -> ColorSettings:
         if self._colors is None:
             self._colors = self._color_settings()
         return self._colors
@@ -613,7 +609,7 @@ class LaserScanDisplay(CloudDisplay):
         return motion if moved > _STILL else None
 
 
-def _prepare_scan(scan: Any, settings: _ColorSettings) -> _Prepared:
+def _prepare_scan(scan: Any, settings: ColorSettings) -> PreparedCloud:
     cloud = cloud_from_laser_scan(scan)
     duration = float(scan.time_increment) * max(len(scan.ranges) - 1, 0)
     if not 0 <= duration <= _MAX_SCAN_S:
@@ -624,293 +620,6 @@ def _prepare_scan(scan: Any, settings: _ColorSettings) -> _Prepared:
         cloud.warnings = (*cloud.warnings, text)
         duration = 0.0
     return settings.prepare(cloud)._replace(source=scan, duration_ns=round(duration * 1e9))
-
-
-#: Encodings of depth images; others are color images.
-_DEPTH_ENCODINGS = ("16UC1", "mono16", "32FC1")
-#: Seconds that color images may be behind depth images, which wait for them.
-_MAX_BEHIND_S = 3.0
-#: Motion of a depth camera after which hidden points are dropped, as in RViz.
-_MOVED_M, _MOVED_DEG = 0.01, 0.5
-#: In the format of compressed ones.
-_COMPRESSED_DEPTH = "compressedDepth"
-
-
-class _DepthMatcher:
-    """Combines depth images with the camera's calibration, and with color images of the same time.
-
-    Used in the node's threads.
-
-    Args:
-        info_topic: Where the calibration is from, for errors.
-        color_topic: The same of color images; empty if depth images have no color.
-        size: How many images wait for others.
-    """
-
-    def __init__(self, info_topic: str, color_topic: str, size: int) -> None:
-        self._info_topic, self._color_topic = info_topic, color_topic
-        self._lock = threading.Lock()
-        self._info: Any = None
-        self._size = size
-        self._depths: deque[Any] = deque()
-        self._colors: deque[Any] = deque()
-
-    def match(self, message: Any) -> tuple[Any, Any, Any] | None:
-        """Take a message, and return a depth image, its calibration and color once all are there.
-
-        Raises:
-            Error: Something is missing; the text says what.
-        """
-        with self._lock:
-            if "format" in message:
-                is_depth, kind = _COMPRESSED_DEPTH in message.format, message.format
-            elif "encoding" in message:
-                is_depth, kind = message.encoding in _DEPTH_ENCODINGS, message.encoding
-            else:
-                self._info = message
-                return None
-            if not is_depth and not self._color_topic:
-                known = ", ".join((*_DEPTH_ENCODINGS, _COMPRESSED_DEPTH))
-                raise Error(f"encoding: a depth image is {known}, got {kind[:60]!r}")
-            images = self._depths if is_depth else self._colors
-            images.append(message)
-            drop_oldest(images, self._size, lambda one: len(one.data))
-            if self._info is None:
-                raise Error(f"no camera info received; publish it on {self._info_topic}")
-            if not self._color_topic:
-                return self._depths.pop(), self._info, None
-            return self._pair()
-
-    def _pair(self) -> tuple[Any, Any, Any] | None:
-        """Return the newest depth image whose color is known: that of the nearest time."""
-        if not self._depths:
-            return None
-        colors = [(frame_and_stamp(color)[1], color) for color in self._colors]
-        if not colors:
-            if len(self._depths) == self._size:
-                raise Error(f"no color image received; publish it on {self._color_topic}")
-            return None
-        for at in range(len(self._depths) - 1, -1, -1):
-            depth = self._depths[at]
-            stamp = frame_and_stamp(depth)[1]
-            # Until one of this time or a later one is there, a nearer one may follow.
-            if max(when for when, _ in colors) >= stamp:
-                for _ in range(at + 1):
-                    self._depths.popleft()
-                return depth, self._info, min(colors, key=lambda one: abs(one[0] - stamp))[1]
-        behind_s = (frame_and_stamp(self._depths[-1])[1] - max(when for when, _ in colors)) * 1e-9
-        if behind_s > _MAX_BEHIND_S:
-            raise Error(
-                f"the last color image of {self._color_topic} is {behind_s:.0f} s older than the "
-                "depth image"
-            )
-        return None
-
-
-def _prepare_depth(
-    message: Any,
-    matcher: _DepthMatcher,
-    settings: _ColorSettings,
-    occlusion: OcclusionBuffer | None,
-) -> _Prepared | None:
-    found = matcher.match(message)
-    if found is None:
-        return None
-    depth, info, color = found
-    image = _decompress(depth)
-    size = _image_size(info)
-    if all(size) and size != (image.width, image.height):
-        raise Error(
-            f"the depth image is {image.width}x{image.height} pixels, the camera info "
-            f"{size[0]}x{size[1]}; use the camera info of the depth image"
-        )
-    colors = None if color is None else _decompress(color)
-    hidden = 0
-    if occlusion is None:
-        cloud = cloud_from_depth_image(image, info, colors)
-    else:
-        # RViz takes the time of arrival, which says less of an image that was recorded.
-        stamp = frame_and_stamp(depth)[1]
-        now_s = stamp * 1e-9 if stamp else time.monotonic()
-        cloud, hidden = occlusion.add(image, info, colors, now_s)
-    if color is not None and color.header.frame_id != depth.header.frame_id:
-        text = (
-            f"the frame of the depth image is [{depth.header.frame_id}], that of the color image "
-            f"[{color.header.frame_id}]; use a registered depth image"
-        )
-        cloud.warnings = (*cloud.warnings, text)
-    focal_px = float(info["p" if "p" in info else "P"][0]) / max(info.binning_x, 1)
-    pixel_m = min(1 / abs(focal_px), _MAX_SIZE_M)
-    return settings.prepare(cloud)._replace(source=depth, pixel_m=pixel_m, hidden=hidden)
-
-
-def _image_size(info: Any) -> tuple[int, int]:
-    """Return width and height of a camera's images: of its region of interest, binned."""
-    roi = info.roi
-    return (
-        (roi.width or info.width) // max(info.binning_x, 1),
-        (roi.height or info.height) // max(info.binning_y, 1),
-    )
-
-
-def _has_moved(pose: NDArray[np.float64], before: NDArray[np.float64]) -> bool:
-    """Return whether a camera has moved so far that what it has seen before is elsewhere."""
-    turn = before[:3, :3].T @ pose[:3, :3]
-    angle = math.degrees(math.acos(min(max((float(np.trace(turn)) - 1) / 2, -1.0), 1.0)))
-    moved = float(np.linalg.norm(pose[:3, 3] - before[:3, 3]))
-    return moved > _MOVED_M or angle > _MOVED_DEG
-
-
-def _decompress(message: Any) -> Any:
-    """Return an image that a transport has compressed; others as they are."""
-    if "format" not in message:
-        return message
-    is_depth = _COMPRESSED_DEPTH in message.format
-    return (decompress_depth if is_depth else decompress)(message.data, message.format)
-
-
-class DepthCloudDisplay(CloudDisplay):
-    """The points of a depth image, and their colors. See its page in ``docs/scene.md``."""
-
-    TYPE = "DepthCloud"
-    MESSAGES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/CameraInfo")
-    SUGGESTED = ("sensor_msgs/Image",)
-    IS_CONTINUOUS = True
-
-    transport = Setting(
-        "Depth Map Transport Hint", "enum", "raw", "Transport of depth images.",
-        choices=["raw", _COMPRESSED_DEPTH], then="_on_topic",
-    )  # fmt: skip
-    colorTransport = Setting(
-        "Color Transport Hint", "enum", "raw", "Transport of color images.",
-        choices=["raw", "compressed"], then="_on_topic",
-    )  # fmt: skip
-    colorTopic = Setting(
-        "Color Image Topic", "topic", "", "Color images of the same camera; empty for none.",
-        then="_on_topic",
-    )  # fmt: skip
-    size = _size(autoSize=False)
-    autoSize = Setting(
-        "Auto Size", "bool", True, "Draw points as large as their pixels.", shown_if=_METRIC
-    )
-    autoSizeFactor = Setting(
-        "Auto Size/Auto Size Factor", "float", 1.0, "Factor of the automatic size.",
-        min=0.0001, max=_MAX_SIZE_M, shown_if={"autoSize": True},
-    )  # fmt: skip
-    occlusionCompensation = Setting(
-        "Occlusion Compensation", "bool", False,
-        "Keep points that nearer ones hide, until the camera moves.",
-        then="_on_occlusion",
-    )  # fmt: skip
-    occlusionTimeOut = Setting(
-        "Occlusion Compensation/Occlusion Time-Out", "float", 30.0,
-        "Seconds for which hidden points are kept.", min=0.0, max=1e9,
-        shown_if={"occlusionCompensation": True},
-    )  # fmt: skip
-
-    def __init__(
-        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
-    ) -> None:
-        self._matcher = _DepthMatcher("", "", 1)
-        self._occlusion = OcclusionBuffer()
-        #: Pose of the camera when the buffer was reset; None before the first image.
-        self._camera_pose: NDArray[np.float64] | None = None
-        super().__init__(parent, runtime)
-
-    def further_topics(self, topic: str) -> tuple[str, ...]:
-        """Return the topics of the calibration, and of color images."""
-        colors = self._resolve_further("Color Image Topic", self.colorTopic)
-        return (
-            camera_info_topic(topic),
-            *(_transported(one, self.colorTransport) for one in colors),
-        )
-
-    def _wanted(self) -> tuple[Any, ...] | None:
-        wanted = super()._wanted()
-        if wanted is None:
-            return None
-        node, (topic, *others), qos = wanted
-        self._resolved = _transported(topic, self.transport)
-        return node, (self._resolved, *others), qos
-
-    def _factory(self, *wanted: Any) -> Callable[[], Any]:
-        (topic, info_topic, *color), depth = wanted[1], self.depth
-        del topic
-        self._matcher = _DepthMatcher(info_topic, color[0] if color else "", depth)
-        return super()._factory(*wanted)
-
-    def preparer(self) -> Callable[[Message], Any]:
-        """Return the function that waits for what belongs together, and makes a cloud of it."""
-        matcher, settings = self._matcher, self._color_settings()
-        occlusion = self._occlusion if self.occlusionCompensation else None
-        return lambda message: _prepare_depth(message, matcher, settings, occlusion)
-
-    def _on_occlusion(self) -> None:
-        self._forget_hidden()
-        self._restyle()
-
-    def _restyle(self) -> None:
-        self._occlusion.timeout_s = self.occlusionTimeOut
-        super()._restyle()
-
-    def _forget_hidden(self) -> None:
-        self._occlusion.reset()
-        self._camera_pose = None
-        self.delete_status("Occlusion")
-
-    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:
-        """Show a cloud, without points that were hidden before the camera has moved."""
-        if self.occlusionCompensation:
-            before = self._camera_pose
-            if before is None or _has_moved(pose, before):
-                self._camera_pose = pose
-                if before is not None:
-                    self._occlusion.reset()
-                    data = self._without_hidden(data)
-            text = f"[{data.hidden}] points are of earlier images, {self.occlusionTimeOut:g} s old"
-            self.set_status("Occlusion", "ok", f"{text} at most")
-        super().show(data, pose, frame, stamp)
-
-    def _without_hidden(self, data: _Prepared) -> _Prepared:
-        if not data.hidden:
-            return data
-        cloud, count = data.cloud, data.cloud.point_count - data.hidden
-        size = count * cloud.layout.point_step
-        layout = replace(cloud.layout, width=count, row_step=size)
-        seen = Cloud(layout, cloud.data[:size], cloud.warnings)
-        new = self._current_settings().prepare(seen)
-        return new._replace(source=data.source, pixel_m=data.pixel_m)
-
-    def on_fixed_frame(self) -> None:
-        """Show the last cloud in the new fixed frame, in which the camera may be elsewhere."""
-        self._forget_hidden()
-        super().on_fixed_frame()
-
-    def reset(self) -> None:
-        """Drop all clouds, and what the camera has seen."""
-        super().reset()
-        self._forget_hidden()
-
-    def _point_size(self, data: _Prepared) -> tuple[float, bool]:
-        if self.autoSize and self.style != "Points":
-            return self.autoSizeFactor * data.pixel_m, True
-        return super()._point_size(data)
-
-    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file, in which the topic has another name."""
-        return super().load_settings({**saved, "Topic": saved.get("Depth Map Topic", "")})
-
-    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:  # noqa: ARG002 - in both RViz the same
-        """Return the settings for a file of either RViz."""
-        kept = super().save_settings(older, 1)
-        kept["Depth Map Topic"] = kept.pop("Topic")
-        # A setting of this name is another one's.
-        return {**kept, "Topic": older["Topic"]} if older and "Topic" in older else kept
-
-
-def _transported(topic: str, transport: str) -> str:
-    """Return the topic of a transport of image_transport."""
-    return topic if transport == "raw" else f"{topic}/{transport}"
 
 
 def _read_value(name: str) -> Callable[[Any], Cloud]:

@@ -28,7 +28,8 @@ from rosglass.scene.configs.rviz_formats import (
 from rosglass.scene.configs.settings import Setting
 from rosglass.scene.displays.shapes import ArrowShapes
 from rosglass.scene.render.matrices import instance_matrix
-from rosglass.scene.tools.tool import MAP, PointerEvent, Tool, point_text
+from rosglass.scene.tools.pointer_event import PointerEvent, point_text
+from rosglass.scene.tools.tool import MAP, Tool
 from rosglass.scene.view_controllers.events import Button
 
 if TYPE_CHECKING:

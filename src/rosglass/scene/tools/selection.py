@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Change", "SelectedPart", "Selection"]
 
 #: A type of Qt by its name, which PySide's hints do not have.
-_LIST: Any = "QVariantList"
+LIST: Any = "QVariantList"
 
 Change = Literal["replace", "add", "remove"]
 
@@ -94,7 +94,7 @@ class Selection(QtCore.QObject):
     #: Number of selected parts.
     count = Property(int, len, notify=changed)
     #: The selected parts, at most 200: ``display``, ``part`` and ``lines`` of name and value.
-    parts = Property(_LIST, lambda self: self._for_qml(), notify=changed)
+    parts = Property(LIST, lambda self: self._for_qml(), notify=changed)
 
     def __init__(
         self,

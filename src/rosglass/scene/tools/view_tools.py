@@ -13,7 +13,8 @@ from rosglass.qt import QtCore, QtQml, Signal
 from rosglass.scene.configs.settings import Setting, rgb_of
 from rosglass.scene.render.drawing import Labels, Lines
 from rosglass.scene.render.matrices import instance_matrix
-from rosglass.scene.tools.tool import PointerEvent, Tool, camera_cursor, point_text
+from rosglass.scene.tools.pointer_event import PointerEvent, camera_cursor, point_text
+from rosglass.scene.tools.tool import Tool
 from rosglass.scene.view_controllers.events import Button, Modifier, Wheel
 
 if TYPE_CHECKING:

@@ -28,7 +28,7 @@ from rosglass.scene.view_controllers.views import VIEWS, create_view
 if TYPE_CHECKING:
     from rosglass.scene.configs.rviz_config import RvizConfig, ViewConfig
     from rosglass.scene.displays.scene import Scene
-    from rosglass.scene.view_controllers.views import ViewController
+    from rosglass.scene.view_controllers.view_controller import ViewController
 
 __all__ = [
     "GroupDisplay",

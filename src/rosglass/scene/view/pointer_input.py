@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtGui import QEventPoint, QGuiApplication
 
 from rosglass.qt import QtCore, Slot, is_alive
-from rosglass.scene.tools.tool import PointerEvent
+from rosglass.scene.tools.pointer_event import PointerEvent
 from rosglass.scene.view_controllers.events import Button, Modifier, Touch, Wheel
 
 if TYPE_CHECKING:
-    from rosglass.scene.tools.tool import Tools
+    from rosglass.scene.tools.tool_manager import Tools
 
 __all__ = ["PointerInput"]
 

@@ -26,7 +26,8 @@ from rosglass.scene.render.picking import pick
 from rosglass.scene.render.renderer import Frame, SceneRenderer
 from rosglass.scene.render.scene_tree import Group
 from rosglass.scene.tools.selection import Selection
-from rosglass.scene.tools.tool import Tool, Tools
+from rosglass.scene.tools.tool import Tool
+from rosglass.scene.tools.tool_manager import Tools
 from rosglass.scene.view.display_configs import (
     add_controller,
     check_panels,
@@ -37,8 +38,9 @@ from rosglass.scene.view.display_configs import (
 )
 from rosglass.scene.view.frame_scheduler import NO_GPU, FrameScheduler, close_renderers
 from rosglass.scene.view.pointer_input import PointerInput
+from rosglass.scene.view_controllers.view_controller import ViewController
 from rosglass.scene.view_controllers.view_settings import setting_text, setting_value
-from rosglass.scene.view_controllers.views import VIEWS, ViewController, create_view
+from rosglass.scene.view_controllers.views import VIEWS, create_view
 
 if TYPE_CHECKING:
     import os

@@ -12,7 +12,6 @@ from rosglass.overlay.orbit import Point
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rosglass.scene.view_controllers.views import ViewController
 
 __all__ = [
     "MAX_NAME_LENGTH",
@@ -54,15 +53,15 @@ class ViewSetting(Generic[_T]):
     def __get__(self, view: None, owner: type) -> ViewSetting[_T]: ...
 
     @overload
-    def __get__(self, view: ViewController, owner: type) -> _T: ...
+    def __get__(self, view: Any, owner: type) -> _T: ...
 
-    def __get__(self, view: ViewController | None, owner: type) -> ViewSetting[_T] | _T:
+    def __get__(self, view: Any | None, owner: type) -> ViewSetting[_T] | _T:
         if view is None:
             return self
         value: _T = view._values[self.name]
         return value
 
-    def __set__(self, view: ViewController, value: Any) -> None:
+    def __set__(self, view: Any, value: Any) -> None:
         view._store(self.name, self.read(value))
         view._on_set(self.name)
 

@@ -7,55 +7,46 @@ Where RViz 1.14 and RViz 2 differ, the rule is RViz 2's, unless a class says oth
 
 from __future__ import annotations
 
-import copy
 import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rosglass.comm.names import similar
-from rosglass.errors import ArgumentError, Error, shown
+from rosglass.errors import Error, shown
 from rosglass.overlay.orbit import STEEPEST, Orbit, Point
-from rosglass.scene.configs.rviz_formats import FIXED_FRAME
 from rosglass.scene.render.camera import (
     FOV_RAD,
     Camera,
     Matrix,
-    inverse,
     point_of,
-    pose_matrix,
-    three_numbers,
     unit,
 )
 from rosglass.scene.view_controllers.events import Action, Button, Drag, Modifier, Touch, Wheel
+from rosglass.scene.view_controllers.view_controller import (
+    DEFAULT_DISTANCE_M,
+    DRAG_ZOOM,
+    WHEEL_ZOOM,
+    FocalShape,
+    ViewController,
+    wheel_ratio,
+)
 from rosglass.scene.view_controllers.view_settings import (
     MAX_NAME_LENGTH,
     ChoiceSetting,
     FlagSetting,
-    FrameSetting,
     NumberSetting,
     PointSetting,
     ScaleSetting,
-    ViewSetting,
-    finite_number,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from numpy.typing import ArrayLike
 
 __all__ = [
     "VIEWS",
     "FPSView",
-    "FocalShape",
     "FrameAlignedView",
     "OrbitView",
     "ThirdPersonFollowerView",
     "TopDownOrthoView",
-    "ViewController",
     "XYOrbitView",
     "create_view",
 ]
@@ -64,8 +55,7 @@ __all__ = [
 _ORTHO_HEIGHT_M = 500.0
 #: Radians of rotation for each unit that the mouse moves.
 _TURN_RAD = 0.005
-#: Share by which one unit of a drag, and one step of the wheel, zooms.
-_DRAG_ZOOM, _WHEEL_ZOOM = 0.01, 0.12
+
 #: Metres that first-person views move for each unit of a drag, and each step of the wheel.
 _DRAG_M, _DRAG_AHEAD_M, _WHEEL_AHEAD_M = 0.01, 0.1, 1.2
 #: How far above its orbit a view on the ground has its camera, as a share of the distance: what it
@@ -75,373 +65,6 @@ _RAISED = 0.2
 _TAKEOVER_DISTANCE_M = 100.0
 #: Cosine from which a camera counts as pointing along an axis.
 _ALONG_AXIS = 0.999
-
-
-class FocalShape(NamedTuple):
-    """The flat ball that RViz shows, while a button is held, at the point that is orbited.
-
-    Attributes:
-        pose: Its pose in the fixed frame, 4 x 4.
-        size: Metres across in x, y and z.
-        color: RGBA, 0 to 1.
-    """
-
-    pose: Matrix
-    size: tuple[float, float, float]
-    color: tuple[float, float, float, float]
-
-
-class ViewController:
-    """Base class of the view controllers, which :data:`VIEWS` lists.
-
-    A view follows its target frame, and keeps its settings in it. The scene calls
-    :meth:`update_target` before each frame, and draws :meth:`camera`.
-
-    Args:
-        class_id: RViz's, e.g. ``rviz/Orbit``; RViz 2's by default.
-
-    Attributes:
-        name: Name of the view, as saved views have one.
-        problem: Why the target frame cannot be followed; empty if it can.
-        on_change: Called after each change of a setting.
-        on_target: Called after another target frame was chosen.
-    """
-
-    #: Name of the type, as in RViz's Views panel.
-    TYPE = ""
-    #: A sentence about the type.
-    DESCRIPTION = ""
-
-    #: The effect of dragging with the left and the right button, without and with Shift.
-    _LEFT = (Action.ROTATE_3D, Action.MOVE_XY)
-    _RIGHT = (Action.ZOOM, Action.MOVE_Z)
-    #: Instructions for the status bar, without and with Shift.
-    _HELP = ("", "")
-
-    near_clip = NumberSetting(
-        "Near Clip Distance",
-        0.01,
-        "Anything closer to the camera than this threshold will not get rendered.",
-        0.001,
-        10_000.0,
-    )
-    invert_z = FlagSetting(
-        "Invert Z Axis", False, "Invert camera's Z axis for Z-down environments/models."
-    )
-    target_frame = FrameSetting(
-        "Target Frame", FIXED_FRAME, "TF frame whose motion this view will follow."
-    )
-
-    def __init__(self, class_id: str = "") -> None:
-        self.class_id = class_id or f"rviz_default_plugins/{self.TYPE}"
-        self.name = "Current View"
-        self.problem = ""
-        self.on_change: Callable[[], None] | None = None
-        self.on_target: Callable[[], None] | None = None
-        self._values: dict[str, Any] = {s.name: s.default for s in self.settings()}
-        self._unknown: dict[str, Any] = {}
-        #: The target frame's pose in the fixed frame, and as much of it as the view follows.
-        self._target_pose: Matrix = np.eye(4)
-        self._target: Matrix = np.eye(4)
-        #: Another frame was chosen while the view was shown: the camera stays where it is.
-        self._target_chosen = self._was_shown = False
-
-    @classmethod
-    def settings(cls) -> tuple[ViewSetting[Any], ...]:
-        """Return the settings, in the order of RViz's panel."""
-        found = {
-            name: member
-            for base in reversed(cls.__mro__)
-            for name, member in vars(base).items()
-            if isinstance(member, ViewSetting)
-        }
-        return tuple(found.values())
-
-    # Panels and files
-
-    def get(self, name: str) -> Any:
-        """Return the value of a setting, by RViz's name.
-
-        Raises:
-            Error: There is none of this name.
-        """
-        return self._values[self._setting(name).name]
-
-    def set(self, name: str, value: Any) -> None:
-        """Change a setting, by RViz's name; numbers are clamped to its limits, as in RViz.
-
-        Raises:
-            Error: There is none of this name, or it cannot hold the value.
-        """
-        self._setting(name).__set__(self, value)
-
-    def describe(self) -> Iterator[dict[str, Any]]:
-        """Iterate over the settings: path, kind, value, default, description and limits."""
-        for setting in self.settings():
-            yield {
-                "path": setting.name,
-                "kind": setting.KIND,
-                "value": setting.write(self._values[setting.name]),
-                "default": setting.write(setting.default),
-                "description": setting.description,
-                **setting.options(),
-            }
-
-    def _setting(self, name: str) -> ViewSetting[Any]:
-        names = {setting.name: setting for setting in self.settings()}
-        if not isinstance(name, str) or name not in names:
-            hint = similar(name, names) if isinstance(name, str) and len(name) < 100 else ""
-            hint = hint or f"; there are: {', '.join(names)}"
-            raise Error(f"the view {self.TYPE} has no setting {shown(name)}{hint}")
-        return names[name]
-
-    def state(self) -> dict[str, Any]:
-        """Return the view as it stands in a ``.rviz`` file, under Views: Current or Saved."""
-        found = {s.name: s.write(self._values[s.name]) for s in self.settings()}
-        found.update(Class=self.class_id, Name=self.name)
-        package, _, kind = self.class_id.rpartition("/")
-        if package != "rviz":
-            # RViz 1.14 no longer writes it.
-            found["Value"] = f"{kind} ({package})"
-        return dict(sorted({**copy.deepcopy(self._unknown), **found}.items()))
-
-    def restore(self, state: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a ``.rviz`` file; what it does not have stays as it is.
-
-        Args:
-            state: As from :meth:`state`, of RViz 1 or 2. Unknown keys are kept.
-
-        Returns:
-            A warning for each value that was ignored, beginning with the setting's name.
-
-        Raises:
-            ArgumentError: The state is not a mapping.
-        """
-        if not isinstance(state, Mapping):
-            raise ArgumentError("the view", state, "a mapping of settings by name")
-        warnings = []
-        self._was_shown = False
-        # An axis to point towards comes before the angles, which it sets.
-        for setting in sorted(self.settings(), key=lambda s: s.KIND != "enum"):
-            if setting.name in state:
-                try:
-                    setting.__set__(self, state[setting.name])
-                except ArgumentError as error:
-                    warnings.append(str(error))
-        name = state.get("Name", self.name)
-        if isinstance(name, str) and len(name) <= MAX_NAME_LENGTH:
-            self.name = name
-        else:
-            warnings.append(f"Name: expected a text of one line, got {shown(name)}")
-        known = {s.name for s in self.settings()} | {"Class", "Name"}
-        self._unknown = {
-            key: copy.deepcopy(value)
-            for key, value in state.items()
-            if isinstance(key, str) and key not in known
-        }
-        return warnings
-
-    # What the scene asks
-
-    def update_target(self, pose: ArrayLike | None, reason: str = "") -> bool:
-        """Follow the target frame; the camera stays where it is while there is no transform.
-
-        Args:
-            pose: Its pose in the fixed frame, 4 x 4; None if it is not known. The fixed frame's
-                own needs no update.
-            reason: Why it is not known, for :attr:`problem`.
-
-        Returns:
-            Whether the camera has moved.
-        """
-        try:
-            whole = None if pose is None else pose_matrix(pose, "the transform")
-        except Error as error:
-            whole, reason = None, str(error)
-        if whole is None:
-            reason = reason or f"no transform from {self.target_frame} to the fixed frame"
-            self.problem = f"{type(self).target_frame.name}: {reason}"
-            return False
-        self.problem = ""
-        before, self._target_pose = self._target, whole
-        self._target = self._followed(whole)
-        if self._target_chosen:
-            self._target_chosen = False
-            self._carry(inverse(self._target) @ before)
-        return not np.array_equal(before, self._target)
-
-    def camera(self, width: float, height: float) -> Camera:
-        """Return the camera for an item of a size."""
-        self._was_shown = True
-        return Camera(
-            self._target @ self._eye_pose(),
-            (max(width, 1.0), max(height, 1.0)),
-            self._fov(),
-            near=self.near_clip,
-            focus_distance=self._focus_distance(),
-        )
-
-    def focal_shape(self) -> FocalShape | None:
-        """Return what to show while a button is held, if anything."""
-        return None
-
-    def action(self, buttons: Button, modifiers: Modifier) -> Action:
-        """Return what a drag would do, which also is the mouse's cursor."""
-        shift = bool(modifiers & Modifier.SHIFT)
-        if buttons & Button.LEFT:
-            return self._LEFT[shift]
-        if buttons & Button.MIDDLE:
-            return Action.MOVE_XY
-        return (self._RIGHT if buttons & Button.RIGHT else self._LEFT)[shift]
-
-    def help(self, modifiers: Modifier) -> str:
-        """Return what the mouse does, for the status bar; bold as in HTML."""
-        return self._HELP[bool(modifiers & Modifier.SHIFT)]
-
-    # Events
-
-    def on_drag(self, drag: Drag) -> None:
-        """Move the camera by the mouse."""
-        if not drag.buttons:
-            return
-        action = self.action(drag.buttons, drag.modifiers)
-        if action is Action.ROTATE_3D:
-            self._rotate(drag)
-        elif action is Action.ROTATE_2D:
-            self._turn(drag)
-        elif action is Action.MOVE_XY:
-            self._move(drag)
-        elif action is Action.MOVE_Z:
-            self._move_z(drag.dy)
-        elif action is Action.ZOOM:
-            self._zoom(1 + _DRAG_ZOOM * drag.dy)
-
-    def on_wheel(self, wheel: Wheel) -> None:
-        """Zoom by the mouse's wheel, 12 % for a step."""
-        self._zoom(_wheel_ratio(wheel.steps))
-
-    def on_touch(self, touch: Touch) -> None:
-        """Rotate by one finger; move, zoom and turn by two."""
-        button = Button.LEFT if touch.fingers == 1 else Button.MIDDLE
-        if touch.dx or touch.dy:
-            position = (touch.x, touch.y, touch.dx, touch.dy)
-            self.on_drag(Drag(*position, button, Modifier.NONE, touch.size))
-        if touch.fingers > 1:
-            if touch.pinch > 0:
-                self._pinch(touch.pinch)
-            if touch.twist:
-                self._twist(touch.twist)
-
-    def on_key(self, key: str, pointed: Sequence[float] | None = None) -> bool:
-        """Handle RViz's keys: F looks at what is under the mouse, Z resets the view.
-
-        Args:
-            key: The character.
-            pointed: The point under the mouse in the fixed frame; None if there is nothing.
-
-        Returns:
-            Whether the view has used it.
-        """
-        if key.lower() == "f" and pointed is not None:
-            self.look_at(pointed)
-            return True
-        if key.lower() == "z":
-            self.reset()
-            return True
-        return False
-
-    # Commands
-
-    def look_at(self, point: Sequence[float]) -> None:
-        """Turn the camera towards a point; a view from above moves above it.
-
-        Args:
-            point: x, y, z in the fixed frame, metres.
-
-        Raises:
-            Error: It is not three finite numbers.
-        """
-        self._look_at(self._to_target(three_numbers(point, "a point to look at", finite=True)))
-
-    def reset(self) -> None:
-        """Return to the start; target frame, near clip distance and z axis stay."""
-        raise NotImplementedError
-
-    def mimic(self, other: ViewController) -> None:
-        """Take over from another view: its target frame, and what it shows as far as possible."""
-        for name in (s.name for s in ViewController.settings()):
-            self._store(name, other._values[name])
-        self._target_pose = other._target_pose
-        self._target = self._followed(other._target_pose)
-        self.problem, self._target_chosen = other.problem, other._target_chosen
-        self._take_over(other, inverse(self._target) @ other._target @ other._eye_pose())
-
-    # What each view has of its own
-
-    def _followed(self, pose: Matrix) -> Matrix:
-        """Return as much of the target frame's pose as the view follows: its position."""
-        followed = np.eye(4)
-        followed[:3, 3] = pose[:3, 3]
-        return followed
-
-    def _carry(self, change: Matrix) -> None:
-        """Stay where it was in the fixed frame, by the matrix from the old target to the new."""
-
-    def _eye_pose(self) -> Matrix:
-        """Return the camera's pose in the target frame."""
-        raise NotImplementedError
-
-    def _fov(self) -> float | None:
-        return FOV_RAD
-
-    def _focus_distance(self) -> float:
-        return OrbitView.distance.default
-
-    def _look_at(self, point: Matrix) -> None:
-        """Look at a point of the target frame."""
-
-    def _take_over(self, other: ViewController, pose: Matrix) -> None:
-        """Show what another view shows, from its camera's pose in the target frame."""
-
-    def _rotate(self, drag: Drag) -> None: ...
-
-    def _turn(self, drag: Drag) -> None: ...
-
-    def _move(self, drag: Drag) -> None: ...
-
-    def _move_z(self, dy: float) -> None: ...
-
-    def _zoom(self, ratio: float) -> None:
-        """Change the distance to what is seen by a ratio."""
-
-    def _pinch(self, ratio: float) -> None:
-        """Magnify the view by a ratio."""
-        self._zoom(1 / ratio)
-
-    def _twist(self, angle: float) -> None:
-        """Turn the view clockwise by radians."""
-
-    # Common parts
-
-    def _store(self, name: str, value: Any) -> None:
-        if self._values[name] != value:
-            self._values[name] = value
-            if self.on_change is not None:
-                self.on_change()
-
-    def _on_set(self, name: str) -> None:
-        """Handle a setting that a user or a program has set."""
-        if name == type(self).target_frame.name:
-            self._target_chosen = self._was_shown
-            if self.target_frame == FIXED_FRAME:
-                self.update_target(np.eye(4))
-            if self.on_target is not None:
-                self.on_target()
-
-    def _to_target(self, point: Sequence[float] | Matrix) -> Matrix:
-        """Return a point of the fixed frame in the target frame."""
-        found: Matrix = (inverse(self._target) @ np.append(point, 1.0))[:3]
-        return found
 
 
 class OrbitView(ViewController):
@@ -461,7 +84,9 @@ class OrbitView(ViewController):
     #: Color of the focal shape, RGBA.
     _COLOR = (1.0, 1.0, 0.0, 0.5)
 
-    distance = NumberSetting("Distance", 10.0, "Distance from the focal point.", 0.001)
+    distance = NumberSetting(
+        "Distance", DEFAULT_DISTANCE_M, "Distance from the focal point.", 0.001
+    )
     focal_shape_size = NumberSetting("Focal Shape Size", 0.05, "Focal shape size.", 0.001, 10_000.0)
     focal_shape_fixed_size = FlagSetting("Focal Shape Fixed Size", True, "Focal shape size.")
     yaw = NumberSetting("Yaw", math.pi / 4, "Rotation of the camera around the Z (up) axis.")
@@ -491,7 +116,7 @@ class OrbitView(ViewController):
     def on_wheel(self, wheel: Wheel) -> None:
         """Zoom, or with Shift move along the line of sight."""
         if wheel.modifiers & Modifier.SHIFT and self._RIGHT[1] is Action.MOVE_Z:
-            self._move_z(-wheel.steps * _WHEEL_ZOOM / _DRAG_ZOOM)
+            self._move_z(-wheel.steps * WHEEL_ZOOM / DRAG_ZOOM)
         else:
             super().on_wheel(wheel)
 
@@ -555,7 +180,7 @@ class OrbitView(ViewController):
         self._shift(-drag.dx * per_unit, drag.dy * per_unit, 0.0)
 
     def _move_z(self, dy: float) -> None:
-        self._shift(0.0, 0.0, dy * _DRAG_ZOOM * self.distance)
+        self._shift(0.0, 0.0, dy * DRAG_ZOOM * self.distance)
 
     def _zoom(self, ratio: float) -> None:
         self.distance *= ratio
@@ -724,7 +349,7 @@ class FPSView(ViewController):
 
     def _zoom(self, ratio: float) -> None:
         """Move ahead for a pinch as for the wheel."""
-        self._shift(0.0, 0.0, (ratio - 1) / _WHEEL_ZOOM * _WHEEL_AHEAD_M)
+        self._shift(0.0, 0.0, (ratio - 1) / WHEEL_ZOOM * _WHEEL_AHEAD_M)
 
     def _shift(self, x: float, y: float, z: float) -> None:
         """Move along the camera's axes."""
@@ -851,7 +476,7 @@ class TopDownOrthoView(ViewController):
 
     def on_wheel(self, wheel: Wheel) -> None:
         """Zoom."""
-        self.scale *= _wheel_ratio(-wheel.steps)
+        self.scale *= wheel_ratio(-wheel.steps)
 
     def reset(self) -> None:
         """Look at the target frame's origin, 10 units to the metre."""
@@ -936,9 +561,6 @@ def create_view(class_id: str) -> ViewController:
     raise Error(f"there is no view {shown(class_id)}{hint or '; there are ' + ', '.join(VIEWS)}")
 
 
-# Geometry
-
-
 def _turned(yaw: float, pitch: float, roll: float) -> Matrix:
     """Return the rotation by ROS's angles, whose columns are what is ahead, left and up."""
     (sy, cy), (sp, cp), (sr, cr) = ((math.sin(a), math.cos(a)) for a in (yaw, pitch, roll))
@@ -967,14 +589,3 @@ def _to_ground(origin: Matrix, direction: Matrix) -> float | None:
         return None
     length = float(-origin[2] / direction[2])
     return length if length >= 0 else None
-
-
-def _wheel_ratio(steps: float) -> float:
-    """Return the ratio of distances for steps of the wheel.
-
-    RViz multiplies for each event. An event of many steps, as a fast wheel or a touchpad gives it,
-    counts as one for each.
-    """
-    steps = min(max(finite_number(steps, "steps of the wheel"), -100.0), 100.0)
-    events = max(1, math.ceil(abs(steps)))
-    return float((1 - _WHEEL_ZOOM * steps / events) ** events)
