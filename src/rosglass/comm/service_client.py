@@ -54,6 +54,7 @@ class PendingCalls:
         self._lock = threading.Lock()
         # Not a dict, whose first item is searched for behind all those that were removed.
         self._calls: OrderedDict[Call, PendingCall] = OrderedDict()
+        self._waiting = 0
 
     def __len__(self) -> int:
         return len(self._calls)
@@ -75,23 +76,31 @@ class PendingCalls:
         """Remove a call that has ended."""
         with self._lock:
             self._calls.pop(pending.call, None)
-            pending.waiting = False
+            self._set_waiting(pending, False)
 
     def enqueue(self, pending: PendingCall) -> None:
         """Let a request wait to be sent, in the order of the calls, unless its call has ended."""
         with self._lock:
-            pending.waiting = pending.call in self._calls
+            self._set_waiting(pending, pending.call in self._calls)
 
     def first(self) -> PendingCall | None:
         """Return the first request that waits; None if there is none."""
-        with self._lock:
-            return next((each for each in self._calls.values() if each.waiting), None)
+        if self._waiting:
+            with self._lock:
+                for pending in self._calls.values():
+                    if pending.waiting:
+                        return pending
+        return None
 
     def take(self, pending: PendingCall) -> bool:
         """Stop a request's wait, to send or to withdraw it; return whether it was waiting."""
         with self._lock:
-            waiting, pending.waiting = pending.waiting, False
-        return waiting
+            return self._set_waiting(pending, False)
+
+    def _set_waiting(self, pending: PendingCall, waiting: bool) -> bool:
+        was, pending.waiting = pending.waiting, waiting
+        self._waiting += waiting - was
+        return was
 
 
 class ServiceRequester(ABC):

@@ -169,7 +169,7 @@ class Call(Promise["Message"]):
     """
 
 
-@dataclass(eq=False, kw_only=True)
+@dataclass(eq=False, kw_only=True, slots=True)
 class PendingCall:
     """A call that has not ended; its client owns it, and enforces its deadline.
 

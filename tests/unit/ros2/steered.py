@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import weakref
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import ConnectionState, EndpointInfo, EndpointKind, NodeName, QoS, Status
@@ -80,8 +79,7 @@ class SteeredRequester(LocalRequester):
         self.sent: list[bytes] = []
         self.timeouts: list[float | None] = []
         self.forgotten: list[int] = []
-        #: Weak references, as the client owns its calls.
-        self._sent_calls: list[weakref.ref[PendingCall]] = []
+        self._numbers: list[int] = []
         #: Requests whose server left, even if another one serves now.
         self.abandoned: set[int] = set()
         super().__init__(owner, info)
@@ -90,7 +88,7 @@ class SteeredRequester(LocalRequester):
         return super().ready() if self.linked is None else self.linked
 
     def send(self, pending: PendingCall, data: bytes | bytearray) -> None:
-        self._sent_calls.append(weakref.ref(pending))
+        self._numbers.append(pending.number)
         super().send(pending, data)
         self.sent.append(bytes(data))
         self.timeouts.append(pending.left())
@@ -100,21 +98,17 @@ class SteeredRequester(LocalRequester):
             super()._fail(number, reason)
 
     def is_reply_lost(self, pending: PendingCall) -> bool:
-        return self._count_of(pending) in self.abandoned
+        return self._numbers.index(pending.number) + 1 in self.abandoned
 
     def forget(self, pending: PendingCall) -> None:
-        self.forgotten.append(self._count_of(pending))
+        self.forgotten.append(self._numbers.index(pending.number) + 1)
         super().forget(pending)
-
-    def _count_of(self, pending: PendingCall) -> int:
-        return next(n for n, sent in enumerate(self._sent_calls, 1) if sent() is pending)
 
     def reply(self, count: int, data: bytes | None, error: str = "") -> None:
         """Hand over a reply to a request that was sent, as if it had been received."""
-        pending = self._sent_calls[count - 1]() if count <= len(self._sent_calls) else None
+        pending = self._take(self._numbers[count - 1]) if count <= len(self._numbers) else None
         if self.closed or pending is None:
             return
-        self._take(pending.number)
         if data is None:
             pending.fail(error)
         else:
