@@ -119,7 +119,7 @@ on_screens() {
 # Types take long, on one core: they begin first, and others go before them.
 background group "types (mypy --strict)" nice -n 5 .venv/bin/mypy
 group "lint and format (ruff)" lint
-group "words (the glossary of CONTRIBUTING.md)" .venv/bin/python scripts/words.py
+group "words (scripts/words.py)" .venv/bin/python scripts/words.py
 # One row after the other where they would share a network, and with it ROS domains.
 row=
 if scripts/private_network.sh sh -c '[ -n "${ROSGLASS_PRIVATE_NETWORK-}" ]' 2>/dev/null; then

@@ -1,18 +1,15 @@
 """Finds words and sentences that CONTRIBUTING.md replaces, and prints what to write instead.
 
-    .venv/bin/python scripts/words.py
-    .venv/bin/python scripts/words.py --patterns [PATH ...]
+    .venv/bin/python scripts/words.py [PATH ...]
 
-Prints a line for each, ``file:line: 'word': write ...``. Without options it searches for the words
-of the glossary and exits with 1 if there are any: part of the gate. ``--patterns`` also searches
-tests, benchmarks and scripts, for the glossary and for the patterns below, in the given files and
-folders or in all; it ends with the counts of each folder, and exits with 0.
+Searches the given files and folders, or all that the gate checks, for the words of the glossary and
+for the patterns below. Prints a line for each find, ``file:line: 'word': write ...``, and their
+counts by folder; exits with 1 if there are any.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
 import io
 import re
 import sys
@@ -25,8 +22,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
 ROOT = Path(__file__).resolve().parents[1]
-SEARCHED = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "src", "docs", "examples")
-SEARCHED_FOR_PATTERNS = (*SEARCHED, "tests", "benchmarks", "scripts")
+SEARCHED = (
+    *("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "src", "docs", "examples"),
+    *("tests", "benchmarks", "scripts"),
+)
 SUFFIXES = {".md", ".py", ".qml", ".js", ".toml", ".c"}
 
 #: Parts of a file: comments and docstrings, other strings, the first lines of docstrings and of
@@ -183,33 +182,30 @@ def _markdown_parts(file: Path) -> Iterator[tuple[int, str, str]]:
 
 
 def _python_parts(source: str) -> Iterator[tuple[int, str, str]]:
-    documented = set()
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            if node.name.startswith("test_"):
-                yield node.lineno, TEST_NAME, node.name
-        elif not isinstance(node, ast.Module):
-            continue
-        docstring = ast.get_docstring(node)
-        if docstring:
-            at = node.body[0].lineno
-            documented.add(at)
-            yield at, OPENING, docstring.partition("\n")[0]
     after_doc_comment = -1  # the line of the last ``#:`` comment
+    before = ""  # the last word or sign; empty at the beginning of a block, where docstrings are
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        row = token.start[0]
-        if token.type == tokenize.COMMENT:
+        row, kind = token.start[0], tokenize.tok_name[token.type]
+        if kind == "COMMENT":
             text = token.string.lstrip("#: ")
             if token.string.startswith("#:"):
                 if after_doc_comment != row - 1:
                     yield row, DOC_COMMENT, text
                 after_doc_comment = row
             yield row, PROSE, text
-        elif tokenize.tok_name[token.type] in {"STRING", "FSTRING_MIDDLE"}:
-            part = PROSE if row in documented else STRING
+        elif kind in {"STRING", "FSTRING_MIDDLE"}:
+            part = STRING if before else PROSE
+            if not before:
+                yield row, OPENING, token.string.strip("rR\"' \n").partition("\n")[0].rstrip('"')
             for offset, line in enumerate(token.string.splitlines()):
                 if " " in line.strip():
                     yield row + offset, part, line
+        elif kind == "NAME" and before in {"def", "class"} and token.string.startswith("test_"):
+            yield row, TEST_NAME, token.string
+        if kind == "INDENT":
+            before = ""
+        elif kind not in {"COMMENT", "NL", "NEWLINE", "DEDENT"}:
+            before = token.string
 
 
 def _folder(file: Path) -> str:
@@ -218,8 +214,12 @@ def _folder(file: Path) -> str:
     return "/".join(path[: 3 if path[0] in {"src", "tests"} else 1][: max(1, len(path) - 1)])
 
 
-def list_patterns(names: Iterable[str]) -> None:
-    """Print the finds in the given files and folders, and the counts of each folder."""
+def search(names: Iterable[str]) -> int:
+    """Print the finds in the given files and folders, and the counts of each folder.
+
+    Returns:
+        The number of finds.
+    """
     words = Glossary()
     counts: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for file in files(names):
@@ -240,37 +240,25 @@ def list_patterns(names: Iterable[str]) -> None:
         for number, name, text, write in sorted(found):
             counts[_folder(file)][name] += 1
             print(f"{path}:{number}: {text!r}: write {write}")
-    columns = ["glossary", *(pattern.name for pattern in PATTERNS)]
-    width = max([len("all"), *map(len, counts)])
-    print(f"\n{'':{width}}", *columns, "all", sep="  ")
     total = sum(counts.values(), Counter())
-    for folder, count in [*sorted(counts.items()), ("all", total)]:
-        cells = [f"{count[name]:{len(name)}}" for name in columns]
-        print(f"{folder:{width}}", *cells, f"{count.total():3}", sep="  ")
+    if total:
+        columns = ["glossary", *(pattern.name for pattern in PATTERNS)]
+        width = max([len("all"), *map(len, counts)])
+        print(f"\n{'':{width}}", *columns, "all", sep="  ")
+        for folder, count in [*sorted(counts.items()), ("all", total)]:
+            cells = [f"{count[name]:{len(name)}}" for name in columns]
+            print(f"{folder:{width}}", *cells, f"{count.total():3}", sep="  ")
+    return total.total()
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "--patterns", nargs="*", metavar="PATH", help="list the patterns in files and folders"
-    )
-    options = parser.parse_args()
-    if options.patterns is not None:
-        given = [Path(name).resolve() for name in options.patterns]
-        for path in given:
-            if not path.exists() or not path.is_relative_to(ROOT):
-                parser.error(f"{path} is not a file or folder of {ROOT}")
-        names = [str(path.relative_to(ROOT)) for path in given]
-        list_patterns(names or SEARCHED_FOR_PATTERNS)
-        return 0
-    words = Glossary()
-    count = 0
-    for file in files(SEARCHED):
-        for number, line in lines(file):
-            for word, write in words.finds(line):
-                count += 1
-                print(f"{file.relative_to(ROOT)}:{number}: {word!r}: write {write}")
-    return 1 if count else 0
+    parser.add_argument("paths", nargs="*", type=Path, metavar="PATH", help="files and folders")
+    given = [path.resolve() for path in parser.parse_args().paths]
+    for path in given:
+        if not path.exists() or not path.is_relative_to(ROOT):
+            parser.error(f"{path} is not a file or folder of {ROOT}")
+    return 1 if search([str(path.relative_to(ROOT)) for path in given] or SEARCHED) else 0
 
 
 if __name__ == "__main__":

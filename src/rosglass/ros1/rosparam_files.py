@@ -78,7 +78,7 @@ def parse_value(text: str, label: str) -> Any:
     Raises:
         ParameterError: It is not YAML.
     """
-    values = _documents(text, label, "no YAML")
+    values = _documents(text, label, "not YAML")
     if len(values) > 1:
         raise ParameterError(f"{label}: this is more than one value")
     return values[0] if values else None
@@ -101,7 +101,7 @@ def write(path: str | os.PathLike[str], value: Any) -> None:
     write_text(path, dump(value))
 
 
-def _documents(text: str, label: str, fault: str = "no parameter file") -> list[Any]:
+def _documents(text: str, label: str, fault: str = "not a parameter file") -> list[Any]:
     try:
         return load_yaml(text, _loader())
     except load_pyyaml().YAMLError as error:

@@ -267,7 +267,7 @@ def test_param_commands(run, master, tool, tmp_path):
     code, _, err = run("param", "describe", "/robot", "speed")
     assert (code, "rosglass param get /robot/speed" in err) == (1, True)
     code, _, err = run("param", "set", "/robot/speed", "[1, 2")
-    assert (code, "this is no YAML" in err) == (1, True)
+    assert (code, "this is not YAML" in err) == (1, True)
 
 
 def test_interface_commands(run):
