@@ -161,7 +161,7 @@ class Side:
         return [e for e in endpoints if self.is_parallel(e.node)]
 
     def add_type(self, translation: Translation | ServiceTranslation | ActionTranslation) -> None:
-        """Let the node describe a derived type, which no other node has."""
+        """Make the node describe a derived type, which no other node has."""
         if translation.derived and self.node.wire == "cdr":
             default_library().add_version(translation.type.definition)
 

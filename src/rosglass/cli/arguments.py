@@ -123,8 +123,8 @@ def _add_interface_options(
 
     Args:
         parser: Parser of the command.
-        drawn: What the renderer draws.
-        window: What --screenshot shows.
+        drawn: The object that the renderer draws, for the help.
+        window: The object of a screenshot, for the help.
         after: Default of --after, in seconds.
     """
     parser.add_argument(

@@ -60,7 +60,7 @@ def complete_names(
 
     Args:
         what: As for :func:`rosglass.cli.parser.complete`.
-        prefix: What is typed so far.
+        prefix: The text typed so far.
         parsed_args: The options typed so far.
     """
     try:

@@ -97,7 +97,7 @@ class _Finding:
 
     Attributes:
         level: ``ok``, ``note``, ``warning`` or ``error``.
-        area: What was checked.
+        area: The checked area.
         text: The result.
         fix: How to fix it.
     """

@@ -99,7 +99,7 @@ class ProblemReports:
         """Print what has changed.
 
         Args:
-            problems: What has a problem -> the problem.
+            problems: Problems by the name of their cause.
             last: Whether the command ends: new problems are printed at once.
         """
         now = time.monotonic()

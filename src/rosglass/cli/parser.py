@@ -1,4 +1,4 @@
-"""How command lines are parsed: the parser, and the options and types that commands share.
+"""Parses command lines: the parser, and the options and types that commands share.
 
 Imports nothing slow: ``--help`` and Tab completion wait for it.
 """

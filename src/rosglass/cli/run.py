@@ -79,7 +79,7 @@ def show_interface(args: argparse.Namespace, file: str, **options: Any) -> int:
     """Show a QML file as the command line says; returns the exit code.
 
     Args:
-        args: Of a command with the options of interfaces.
+        args: Arguments of a command with the options of interfaces.
         file: The file.
         options: Further options of :func:`show`.
     """
@@ -132,7 +132,7 @@ def show(
         verbose: Show what is logged for developers, too.
         end_process: End the process with the interface, whatever still runs in it.
         longest_script: As for :class:`rosglass.qml.Session`.
-        recorder: What records the window, as long as it is shown.
+        recorder: The recorder of the window, while it is shown.
         options: As for :class:`rosglass.qml.Application`.
 
     Returns:
@@ -217,7 +217,7 @@ def _show(
 
 
 def _check_recording(recorder: WindowRecorder, code: int) -> int:
-    """Say what was recorded; return the program's exit code."""
+    """Report the recording; return the program's exit code."""
     status = recorder.close()
     if not status.frames:
         note(status.problem or f"{recorder.path} was not written: the window was not drawn")
@@ -249,7 +249,7 @@ class Screenshot:
         save: Callable[[Path], None],
         is_loading: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Take it after the given time.
+        """Take the screenshot after the given time.
 
         Args:
             end: Ends the program with an exit code.

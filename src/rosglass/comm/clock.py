@@ -36,7 +36,7 @@ _STILL_S = 5.0
 
 
 class ClockChange(Enum):
-    """How the time source of a clock changed in a jump."""
+    """The change of a clock's time source in a jump."""
 
     NONE = "none"
     TO_SIMULATED = "to simulated"

@@ -191,7 +191,7 @@ class NodeCore(ABC):
                 self.local_gids.discard(oldest)
 
     def wake(self) -> None:
-        """Let the members follow soon, as if the graph had changed; from any thread."""
+        """Update the members soon, as if the graph had changed; from any thread."""
         self._moved = True
         self._worker.wake()
 
@@ -272,7 +272,7 @@ class NodeCore(ABC):
         """Return the state of the connection, in the process that owns it."""
 
     def _follow(self, idle: bool) -> None:
-        """Let the members follow the graph; run by the worker."""
+        """Update the members by the graph; run by the worker."""
         moved, self._moved = self._moved, False
         if not moved and not idle:
             return

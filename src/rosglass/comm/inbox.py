@@ -273,7 +273,7 @@ class Inbox:
 
     @property
     def waiting(self) -> int:
-        """How many samples are waiting."""
+        """Number of waiting samples."""
         return len(self._samples)
 
     @property

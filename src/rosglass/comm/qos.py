@@ -50,7 +50,7 @@ class Durability(Enum):
 
 
 class History(Enum):
-    """Which samples are kept until they are taken."""
+    """The samples that are kept until they are read."""
 
     KEEP_LAST = "keep_last"
     KEEP_ALL = "keep_all"
@@ -59,7 +59,7 @@ class History(Enum):
 
 
 class Liveliness(Enum):
-    """How a publisher asserts that it is alive."""
+    """The way in which a publisher asserts that it is alive."""
 
     AUTOMATIC = "automatic"
     MANUAL_BY_TOPIC = "manual_by_topic"

@@ -79,7 +79,7 @@ class PendingCalls:
             self._set_waiting(pending, False)
 
     def enqueue(self, pending: PendingCall) -> None:
-        """Let a request wait to be sent, in the order of the calls, unless its call has ended."""
+        """Queue a request for sending, in the order of the calls, unless its call has ended."""
         with self._lock:
             self._set_waiting(pending, pending.call in self._calls)
 

@@ -241,7 +241,7 @@ class StampMonitor:
         """Add data and return its lateness in seconds.
 
         Args:
-            source: Where the data is from; each source has its own clock.
+            source: Source of the data; each source has its own clock.
             received: System time of arrival in nanoseconds.
             stamp: The data's own time in nanoseconds; 0 for none.
         """

@@ -343,7 +343,7 @@ class Replier(Handle):
 
         Args:
             request: The request.
-            reason: What failed.
+            reason: The reason of the failure.
             instead: A response to clients that no failure reaches; None to let them wait.
         """
         if instead is not None:

@@ -151,11 +151,11 @@ class DepthColors:
 
 
 class GreyRange(NamedTuple):
-    """How :class:`GreyLevels` shows numbers as greys.
+    """The mapping of numbers to greys by :class:`GreyLevels`.
 
     Attributes:
-        low: What is black, in the numbers of the image; None to follow the images.
-        high: What is white; None to follow the images.
+        low: Value shown as black; None to follow the images.
+        high: Value shown as white; None to follow the images.
         window: Images over whose extremes the medians are what is followed.
     """
 

@@ -63,7 +63,7 @@ class Token(NamedTuple):
     Attributes:
         kind: ``string``, ``char``, ``number``, ``name``, ``sign`` or ``end``.
         text: As written.
-        offset: Where it starts.
+        offset: Its start in the text.
     """
 
     kind: str

@@ -796,7 +796,7 @@ def load(
     Args:
         name: ``pkg/msg/Type`` or ``pkg/Type`` (also ``srv`` and ``action``).
         ros: 2 for ROS 2's definition, 1 for ROS 1's.
-        library: Where to look it up; None for :func:`default_library`.
+        library: Library to search; None for :func:`default_library`.
         hash: RIHS01 hash (ROS 1: md5 sum) that a peer announced for it; picks the version of the
             definition that has it.
 

@@ -19,7 +19,7 @@ class Tool(Plugin):
 
     Args:
         owner: The list.
-        handle: What the 3D view has.
+        handle: The 3D view's own object.
         class_id: RViz's class id, e.g. ``rviz/Measure``; not unique.
         shortcut_key: The key that selects it, e.g. ``m``; empty for none.
     """

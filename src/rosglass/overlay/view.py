@@ -122,7 +122,7 @@ class CurrentView(QtCore.QObject):
             self._set_all(ORBIT, *where.focus, where.distance, yaw, pitch)
 
     def request_frame(self) -> None:
-        """Have another frame drawn, in a view that does not draw all the time."""
+        """Request a frame, in a view that does not draw all the time."""
 
     def close(self) -> None:
         """Release the view; safe to call twice."""
@@ -407,7 +407,7 @@ class View(QtCore.QObject):
         self._current.close()
 
     def request_frame(self) -> None:
-        """Have another frame drawn, in a view that does not draw all the time."""
+        """Request a frame, in a view that does not draw all the time."""
         self._current.request_frame()
 
     # Movements

@@ -48,7 +48,7 @@ class ViewKeys(QtCore.QObject):
     """Keyboard control: arrow keys shift the view, faster with Shift; Ctrl+D toggles 2D and 3D.
 
     Args:
-        target: What gets the keys while the 3D view has the keyboard focus.
+        target: Receiver of keys while the 3D view has the keyboard focus.
         view: The camera.
         before_frame: Signal that the view is about to draw.
         focus_is_elsewhere: Returns whether keys are meant for something over the view.

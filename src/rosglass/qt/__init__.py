@@ -138,7 +138,7 @@ def optional(module: str) -> Any:
 
 
 def import_plainly() -> None:
-    """Let Python import modules again as it does without PySide; for programs of rosglass itself.
+    """Restore Python's own import of modules from PySide's; for programs of rosglass itself.
 
     After each import, PySide 6 reads the source of the module to see whether it uses PySide: a
     tenth of the time until the first frame of ``rosglass view``. Only ``from __feature__ import``,

@@ -63,11 +63,11 @@ class ActionTypes:
 
     Attributes:
         action: The action's.
-        goal: Of goals, client to server.
-        cancel: Of requests to cancel, client to server.
-        status: Of all goals' states, server to client.
-        result: Of results, server to client.
-        feedback: Of feedback, server to client.
+        goal: Topic of goals, client to server.
+        cancel: Topic of requests to cancel, client to server.
+        status: Topic of all goals' states, server to client.
+        result: Topic of results, server to client.
+        feedback: Topic of feedback, server to client.
     """
 
     action: ActionType
@@ -233,7 +233,7 @@ class CommState(Enum):
 
 
 class TerminalState(Enum):
-    """How a goal ended."""
+    """The terminal state of a goal."""
 
     #: Cancelled before it was executed.
     RECALLED = "recalled"
@@ -364,7 +364,7 @@ class CommStateMachine:
 
     @property
     def terminal(self) -> TerminalState | None:
-        """How the goal ended; None before it has."""
+        """The terminal state of the goal; None before it has ended."""
         if self.state is not CommState.DONE:
             return None
         return _ENDS[self.heard or ServerState.LOST][0]

@@ -212,7 +212,7 @@ class ActionlibClientGoal(ClientGoal):
 
     @property
     def terminal_state(self) -> TerminalState | None:
-        """How it ended; None before it has."""
+        """The terminal state; None before it has ended."""
         return self._machine.terminal
 
     @property

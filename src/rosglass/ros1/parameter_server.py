@@ -415,7 +415,7 @@ class MasterCallQueue:
         """Run `job`, which waits for the master; return the promise of its result.
 
         Args:
-            what: What is called for, for messages.
+            what: The purpose of the call, for messages.
             job: Calls the master.
         """
         made: Promise[_T] = Promise(

@@ -307,7 +307,7 @@ class CurrentSceneView(CurrentView):
         return class_id_of(VIEW_IDS, self._view.controller.TYPE, 1)
 
     def request_frame(self) -> None:
-        """Have another frame drawn."""
+        """Request another frame."""
         self._view.update()
 
     @Slot()
@@ -530,7 +530,7 @@ class _Property(NamedTuple):
     """One property of a display, or of the view.
 
     Attributes:
-        kind: What it holds.
+        kind: The type of the value.
         description: For the panel.
         read: Returns its value.
         write: Sets it.

@@ -427,7 +427,7 @@ def report_cancelling(
 
     Args:
         answer: The answer, already settled.
-        what: What should have been cancelled.
+        what: The goals that should have been cancelled.
         caller: The QML line of the request.
         refused: The log level of refusals.
 

@@ -115,7 +115,7 @@ class InitOptions(QtCore.QObject):
 
     @QtCore.QEnum
     class Option(IntEnum):
-        """How the node is created."""
+        """The options for creating the node."""
 
         NoSigintHandler = 1
         AnonymousName = 2

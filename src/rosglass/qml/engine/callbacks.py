@@ -192,7 +192,7 @@ class Answers:
 
 
 def pass_on(done: Future[Any], future: Future[Any]) -> None:
-    """Give a future the outcome of another one, unless it has one."""
+    """Pass the outcome of a future to another one, unless that has one."""
     if future.done():
         return
     error = done.exception()

@@ -286,7 +286,7 @@ class ErrorView:
 
         Args:
             text: The errors.
-            windows: Where to show them.
+            windows: The windows to show them in.
             heading: Their effect on the interface below.
         """
         self.hide()

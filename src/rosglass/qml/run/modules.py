@@ -198,7 +198,7 @@ class _CompositeType(ctypes.Structure):
 
 @cache
 def show_plain_labels() -> None:
-    """Let controls show plain text of limited length; only the first call has an effect.
+    """Limit texts of controls to plain text and a length; only the first call has an effect.
 
     These are buttons, menu items, delegates and tool tips. Qt's IconLabel makes its text without a
     context, and crashes at the first image in it: one text of a robot would end the interface. A

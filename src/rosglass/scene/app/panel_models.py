@@ -40,19 +40,19 @@ class PanelRow(NamedTuple):
     """A row of the panel.
 
     Attributes:
-        key: What stays the same while values change.
+        key: An identity that stays while values change.
         depth: Levels of indentation.
         label: Its name.
         kind: Of the setting, or ``options``, ``display``, ``status``, ``list`` of what is below it,
             ``part`` of a display, e.g. a namespace, ``text`` that is shown only.
-        value: What is shown.
+        value: The shown value.
         description: For the tooltip.
         level: ``ok``, ``warn`` or ``error``.
-        checked: Of displays and parts, whether it is enabled.
+        checked: For displays and parts: whether it is enabled.
         expandable: Whether it has rows below it.
         expanded: Whether these are shown.
-        choices: Of enumerations and names of frames.
-        placeholder: What an empty value means.
+        choices: The values of enumerations and names of frames.
+        placeholder: The meaning of an empty value.
     """
 
     key: tuple[Any, ...]
@@ -486,7 +486,7 @@ class DisplaysModel(QAbstractListModel):
 
     @Slot(int, str)
     def rename(self, row: int, name: str) -> None:
-        """Give a display another name."""
+        """Rename a display."""
         display = self._display_at(row)
         if display is not None and name.strip():
             display.name = name.strip()
@@ -571,7 +571,7 @@ class DisplaysModel(QAbstractListModel):
         Args:
             source: Row of the display.
             row: Row that it is dropped on; the number of rows for below the last one.
-            part: Where in this row, from 0 at its upper edge to 1 at its lower edge.
+            part: Position in this row, from 0 at its upper edge to 1 at its lower edge.
 
         Returns:
             `row` that it goes in front of, `depth`, and `into`, whether it goes into the group of

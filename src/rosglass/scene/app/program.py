@@ -138,7 +138,7 @@ class ViewProgram(QtCore.QObject):
 
     @Slot(QtCore.QObject)
     def begin(self, view: Any) -> None:
-        """Take the window's view, and show the config in it; called by the window."""
+        """Set the window's view, and show the config in it; called by the window."""
         self._view = view
         runtime = runtime_of(view)
         assert runtime is not None
@@ -194,7 +194,7 @@ class ViewProgram(QtCore.QObject):
         self._keep_docks()
 
     def _keep_docks(self) -> None:
-        """Let the view write the hidden docks into configs, also where an overlay saves them."""
+        """Make the view write the hidden docks into configs, also if an overlay saves them."""
         view = self._view
         if view is None:
             return
@@ -318,7 +318,7 @@ class ViewProgram(QtCore.QObject):
 
     @Slot()
     def discard(self) -> None:
-        """Let the window close without saving."""
+        """Allow the window to close without saving."""
         self._discarded = True
 
     def _refresh(self) -> None:

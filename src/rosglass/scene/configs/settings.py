@@ -51,11 +51,11 @@ class Setting(Writable[Any]):
         kind: Of ``bool``, ``int``, ``float``, ``string``, ``path``, ``enum``, ``topic``, ``frame``,
             ``color``, ``vector`` and ``quaternion``.
         default: RViz's default.
-        description: What it does, with its unit.
+        description: Its effect, with its unit.
         then: Method to call after a change.
         shown_if: When it has an effect: values of other properties, or tuples of them, by their
             names. Panels hide it otherwise, as RViz does. None for always.
-        options: What narrows the values: `min`, `max`, `choices`.
+        options: Limits of the values: `min`, `max`, `choices`.
     """
 
     def __init__(
@@ -181,7 +181,7 @@ class Configurable:
             }
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings that a ``.rviz`` file keeps; leave others as they are.
+        """Apply the settings in a ``.rviz`` file; leave others as they are.
 
         Returns:
             What was left out, in words: values that do not fit.

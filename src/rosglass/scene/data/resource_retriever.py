@@ -199,7 +199,7 @@ class ResourceRetriever:
         return found if isinstance(found, bytes) else read_mesh_file(os.fspath(found), uri)
 
     def retry(self) -> None:
-        """Look again for what was not found or fetched, once it is wanted; from any thread."""
+        """Retry missing or unfetched files when they are next requested; from any thread."""
         self._retries = True
         forget_packages()
 

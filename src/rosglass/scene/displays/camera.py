@@ -145,7 +145,7 @@ class CameraDisplay(PictureDisplay):
     # -- files -----------------------------------------------------------------------------------
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file, with the displays that are hidden."""
+        """Apply the settings in a file, with the displays that are hidden."""
         refused = super().load_settings(saved)
         self.hiddenDisplays = list(_hidden_paths(saved.get("Visibility")))
         return refused

@@ -29,7 +29,7 @@ def expect_view(item: Element, attribute: str) -> None:
 
     Args:
         item: The object.
-        attribute: What is not None once it is in a view, also where a program has put it there.
+        attribute: Name of an attribute that is not None once it is in a view, also by a program.
     """
     state = item.__dict__
     if "_expects_view" in state or QtQml.QQmlEngine.contextForObject(item) is None:

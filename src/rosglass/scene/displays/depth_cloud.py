@@ -58,7 +58,7 @@ class _DepthMatcher:
     Used in the node's threads.
 
     Args:
-        info_topic: Where the calibration is from, for errors.
+        info_topic: Topic of the calibration, for errors.
         color_topic: The same of color images; empty if depth images have no color.
         size: How many images wait for others.
     """
@@ -313,7 +313,7 @@ class DepthCloudDisplay(CloudDisplay):
         return super()._point_size(data)
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file, in which the topic has another name."""
+        """Apply the settings in a file, in which the topic has another name."""
         return super().load_settings({**saved, "Topic": saved.get("Depth Map Topic", "")})
 
     def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:  # noqa: ARG002 - in both RViz the same

@@ -84,7 +84,7 @@ class Display(Configurable, TopicElement):
         SUGGESTED: Those of topics that panels suggest for it, if these are fewer.
         TOPIC_KEYS: Entries of a file that name its topic; empty for a display without the settings
             `topic` and `depth`.
-        root: What it draws, in the fixed frame.
+        root: Its drawables, in the fixed frame.
     """
 
     TYPE: ClassVar[str] = ""
@@ -300,7 +300,7 @@ class Display(Configurable, TopicElement):
         """Set a line of the status.
 
         Args:
-            name: What it is about, e.g. ``Topic``.
+            name: Name of the line, e.g. ``Topic``.
             level: ``ok``, ``warn`` or ``error``.
             text: In words: what is wrong, and what to do.
 
@@ -360,7 +360,7 @@ class Display(Configurable, TopicElement):
     # -- files -----------------------------------------------------------------------------------
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file of either RViz, which write topics differently."""
+        """Apply the settings in a file of either RViz, which write topics differently."""
         keys = self.TOPIC_KEYS
         refused = super().load_settings({k: v for k, v in saved.items() if k not in keys})
         if keys:
@@ -382,7 +382,7 @@ class Display(Configurable, TopicElement):
         return kept
 
     def _load_topic(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the topic of a file, with its settings; return what does not fit.
+        """Apply the topic in a file, with its settings; return what does not fit.
 
         Raises:
             Error: The file does not say which topic.
@@ -427,7 +427,7 @@ class Display(Configurable, TopicElement):
         return self._resolved
 
     def _begin_to_wait(self) -> None:
-        """Say that nothing was received, and after a while that there is no publisher."""
+        """Report that nothing was received, and after a while that there is no publisher."""
         self._is_searched = False
         self.delete_status("Topic")
         self._report_waiting()
@@ -440,7 +440,7 @@ class Display(Configurable, TopicElement):
         return is_open and (line is None or line.level != "ok")
 
     def _report_waiting(self) -> None:
-        """Say in the status what is received, as long as that is nothing, and why."""
+        """Report in the status that nothing is received, and why."""
         if self._is_waiting():
             level, text = self._find_reason()
             if level == "error" and Status(level, text) != self.status_lines.get("Topic"):

@@ -409,7 +409,7 @@ class EffortDisplay(HistoryDisplay):
         return found, {**late, **missing}
 
     def _report_joints(self, data: _Efforts, missing: Mapping[str, TransformException]) -> None:
-        """Say which efforts are not drawn, and why."""
+        """Report efforts that are not drawn, and why."""
         assert self._turning is not None
         lines: dict[str, Status] = {}
         for name, (value, at) in data.values.items():
@@ -493,7 +493,7 @@ class EffortDisplay(HistoryDisplay):
     # -- files -----------------------------------------------------------------------------------
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file of either RViz, and which joints it shows."""
+        """Apply the settings in a file of either RViz, and the visibility of joints."""
         return super().load_settings(saved) + self.parts.load(saved)
 
     def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:

@@ -182,7 +182,7 @@ def _draw_screw(display: Any, group: Group, *vectors: tuple[NDArray[Any], Any, f
 
     Args:
         display: The display, with the settings of :func:`_screw_settings`.
-        group: Where they are drawn.
+        group: The group of the drawables.
         vectors: Both vectors, each with its colour and its scale.
     """
     for number, (vector, color, scale) in enumerate(vectors):

@@ -96,7 +96,7 @@ class PictureDisplay(Display):
     # -- files -----------------------------------------------------------------------------------
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file, and where its panel was."""
+        """Apply the settings in a file, and the geometry of the panel."""
         refused = super().load_settings(saved)
         place = saved.get(_PANEL)
         if isinstance(place, dict):

@@ -71,8 +71,8 @@ class _Connection:
 
     Args:
         node: The node.
-        namespace: Of the server, absolute.
-        qos: What is requested of the updates' publishers.
+        namespace: Absolute namespace of the server.
+        qos: QoS to request for updates.
         queue: Receives all that is sent.
         on_failed: Called, in any thread, with why the markers were not received.
     """
@@ -380,7 +380,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
         """Send a feedback; the status says so if no server receives it.
 
         Args:
-            marker: What it is about.
+            marker: The marker.
             feedback: Fields of the message, without `client_id`.
             command: What the user wants, for the status bar if it is not received; empty for what
                 is sent again until it is, or is of no consequence.

@@ -80,8 +80,8 @@ class Control:
     Attributes:
         display: The display.
         marker: The interactive marker.
-        record: What it is.
-        root: What it draws, in the marker's frame.
+        record: Its description.
+        root: Its drawables, in the marker's frame.
     """
 
     def __init__(self, marker: InteractiveMarker, record: ControlRecord) -> None:
@@ -429,9 +429,9 @@ class InteractiveMarker:
 
     Attributes:
         display: The display.
-        record: What it is.
-        root: What it draws, at its frame in the fixed frame.
-        pose: Where it is in its frame.
+        record: Its description.
+        root: Its drawables, at its frame in the fixed frame.
+        pose: Its pose in its frame.
         controls: Its controls by name.
         title: The control that shows its description.
         frame: Its frame.
@@ -546,7 +546,7 @@ class InteractiveMarker:
         """Move it in its frame.
 
         Args:
-            pose: Where to; a rotation that has lost its shape by rounding is mended.
+            pose: The new pose; a rotation is normalised again after rounding.
             control: The control that moves it; empty for the server.
         """
         if not np.isfinite(pose).all():
@@ -614,7 +614,7 @@ class InteractiveMarker:
         Args:
             event: Its type, e.g. :data:`MOUSE_DOWN`.
             control: Name of the control.
-            point: Where the mouse is, in the fixed frame; None for unknown.
+            point: The point under the mouse, in the fixed frame; None for unknown.
             entry: Number of the menu's entry.
             is_last: Whether nothing more will be sent if no server receives it.
         """
@@ -691,7 +691,7 @@ def facing_turn(turn: Matrix, angle: float, camera: Camera) -> Matrix:
     Args:
         turn: The orientation of the control.
         angle: By how much it was rotated about its axis, radians.
-        camera: From where it is seen.
+        camera: The camera.
 
     Returns:
         In the fixed frame, 3 x 3.

@@ -82,7 +82,7 @@ class ControlRecord(NamedTuple):
         description: For the user.
         always_visible: Whether it is shown while the mouse does something else, too.
         independent: Whether its markers turn with the interactive marker though it faces the view.
-        markers: What it looks like.
+        markers: Its markers.
         automatic: Whether RViz's arrows and rings stand for markers that it does not have.
     """
 
@@ -126,7 +126,7 @@ class InteractiveMarkerRecord(NamedTuple):
 
     @property
     def parts(self) -> int:
-        """How many controls and shapes it has."""
+        """Number of its controls and shapes."""
         return sum(1 + len(control.markers) for control in self.controls)
 
 

@@ -160,7 +160,7 @@ class MapDisplay(TopicDisplay):
         return self._cells
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file, in which RViz 2 has chosen the topic of updates."""
+        """Apply the settings in a file, in which RViz 2 has chosen the topic of updates."""
         refused = super().load_settings(saved)
         if self.updateTopic == f"{self.topic}_updates":
             self.updateTopic = ""  # it follows the topic

@@ -209,8 +209,8 @@ class MarkerGroup:
 
         Args:
             key: The marker's.
-            look: What markers of one batch have in common.
-            data: What it must have room for.
+            look: The common properties of the markers of one batch.
+            data: The data that must fit.
             create: Returns a new one.
         """
         batches = cast("list[_B]", self._joint.setdefault(look, []))
@@ -283,7 +283,7 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
 
 
 def _set_list(cloud: Points, marker: MarkerRecord) -> None:
-    """Let points show a list of cubes, spheres or points."""
+    """Set `cloud` to a list of cubes, spheres or points."""
     kind, points, (x, y, z) = marker.kind, marker.points, marker.scale
     each = marker.colors if len(marker.colors) == len(points) else marker.color
     # Their sides are equal: the others come with the pose.
@@ -442,7 +442,7 @@ class Markers(TopicDisplay):
             group.root.visible = self.parts.is_enabled(namespace) and frame not in self._lost
 
     def load_settings(self, saved: Any) -> list[str]:
-        """Take the settings of a file, and which namespaces it shows."""
+        """Apply the settings in a file, and the visibility of namespaces."""
         return super().load_settings(saved) + self.parts.load(saved)
 
     def save_settings(self, older: Any = None, ros: int = 2) -> dict[str, Any]:

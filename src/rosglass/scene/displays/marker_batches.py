@@ -50,7 +50,7 @@ class SolidBatch:
 
         Args:
             key: Its namespace and id.
-            pose: Of its frame.
+            pose: Pose of its frame.
             place: Pose and size in this frame.
             color: RGBA.
         """
@@ -83,7 +83,7 @@ class SolidBatch:
         return self._keys[index]
 
     def flush(self) -> None:
-        """Give the mesh what has changed."""
+        """Update the mesh."""
         count = len(self._keys)
         if self._changed:
             while count > len(self._matrices):
@@ -113,7 +113,7 @@ class TextBatch:
 
     Args:
         origin: x, y, z of a place in the group near all of them.
-        owner: What a pick of them finds; None where they cannot be picked.
+        owner: The result of picking them; None if they cannot be picked.
     """
 
     #: Letters in one batch, each text as a rectangle of as many as its longest line has: they fit
@@ -157,7 +157,7 @@ class TextBatch:
         self._dirty = True
 
     def flush(self) -> None:
-        """Give the labels what has changed."""
+        """Update the labels."""
         if not self._dirty:
             return
         self._dirty = False
@@ -179,7 +179,7 @@ class LineBatch:
     Args:
         width: Metres.
         origin: x, y, z of a place in the group near all of them.
-        owner: What a pick of them finds; None where they cannot be picked.
+        owner: The result of picking them; None if they cannot be picked.
     """
 
     def __init__(self, width: float, origin: Sequence[float], owner: Any) -> None:
@@ -229,7 +229,7 @@ class LineBatch:
         self._dirty = True
 
     def flush(self) -> None:
-        """Give the lines what has changed."""
+        """Update the lines."""
         if not self._dirty:
             return
         self._dirty = False
@@ -269,7 +269,7 @@ class TriangleBatch:
     Args:
         lit: Whether the headlight shades them.
         origin: x, y, z of a place in the group near all of them.
-        owner: What a pick of them finds; None where they cannot be picked.
+        owner: The result of picking them; None if they cannot be picked.
     """
 
     def __init__(self, lit: bool, origin: Sequence[float], owner: Any) -> None:
@@ -303,7 +303,7 @@ class TriangleBatch:
         self._dirty = True
 
     def flush(self) -> None:
-        """Give the mesh what has changed."""
+        """Update the mesh."""
         if not self._dirty:
             return
         self._dirty = False

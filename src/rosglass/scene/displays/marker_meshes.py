@@ -35,7 +35,7 @@ class _MeshFile(NamedTuple):
     Attributes:
         parts: For each part a drawable, with its texture, and the color of its material; None in
             STL files, which have none.
-        problem: What could not be read, in words; empty otherwise.
+        problem: Files that could not be read, in words; empty otherwise.
     """
 
     parts: list[tuple[Mesh, tuple[float, ...] | None]]
@@ -43,7 +43,7 @@ class _MeshFile(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many bytes it takes."""
+        """Its size in bytes."""
         return sum(_size_of(mesh) for mesh, _ in self.parts)
 
 

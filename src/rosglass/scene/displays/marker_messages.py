@@ -87,7 +87,7 @@ class MarkerRecord(NamedTuple):
     Attributes:
         key: Its namespace and id.
         kind: Its type.
-        action: What to do with it.
+        action: The action, as in the message.
         frame: Its frame.
         stamp: Its time in nanoseconds; 0 for the newest.
         pose: In its frame, 4 x 4.
@@ -97,7 +97,7 @@ class MarkerRecord(NamedTuple):
         locked: Whether it moves with its frame.
         points: (n, 3), metres.
         colors: (n, 4) or (0, 4).
-        text: Of texts.
+        text: The text of texts.
         resource: URI of a mesh.
         embedded: Whether a mesh has its own colors.
         problem: Why it is not drawn, in words; empty otherwise.
@@ -189,7 +189,7 @@ def _read_one(
         part: As for :func:`read_marker`.
         numbers: Pose, scale and color.
         is_finite: Whether all of these are, and can be drawn.
-        warning: Of the record.
+        warning: The warning about the record.
         pose: Matrix of the pose.
         scaled: The same, multiplied with the scale.
     """

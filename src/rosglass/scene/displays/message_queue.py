@@ -54,7 +54,7 @@ class QueuedMessage(NamedTuple):
     """A message on its way to the screen.
 
     Attributes:
-        data: What :meth:`TopicDisplay.preparer` has made of it.
+        data: The result of :meth:`TopicDisplay.preparer`.
         frame: Its frame.
         stamp: Its time in nanoseconds; 0 for the newest.
         size: Bytes of it as it was received.
@@ -95,7 +95,7 @@ class MessageQueue:
     Args:
         prepare: Turns a message into what is shown; knows nothing of the display itself.
         types: Names of the types that it accepts.
-        executor: Of the GUI thread.
+        executor: Executor of the GUI thread.
         on_ready: Called there when messages have arrived.
         depth: How many wait there at most; older ones, and those beyond 256 MiB, are dropped and
             counted.
@@ -192,7 +192,7 @@ class Subscriptions:
 
     Args:
         node: The node.
-        profiles: What is requested of publishers, by the absolute name of their topic.
+        profiles: Requested QoS, by the absolute name of the topic.
         queue: Receives all messages.
 
     Raises:

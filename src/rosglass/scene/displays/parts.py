@@ -15,7 +15,7 @@ __all__ = ["Parts"]
 
 
 class Parts:
-    """Which parts of a display are shown, in its panel and in ``.rviz`` files.
+    """The visibility of a display's parts, in its panel and in ``.rviz`` files.
 
     Args:
         title: RViz's name of the list: ``Namespaces``, ``Frames``, ``Links`` or ``Joints``.
@@ -82,7 +82,7 @@ class Parts:
         self._on_change()
 
     def load(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take what a display's settings in a file say of its parts, and nothing else.
+        """Apply the settings of parts in a file, and no others.
 
         Returns:
             What was left out, in words: values that do not fit.

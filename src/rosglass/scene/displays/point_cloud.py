@@ -150,7 +150,7 @@ class _ShownCloud:
     """A cloud on the screen, and what a pick of its points finds.
 
     Attributes:
-        points: What is drawn.
+        points: The drawable.
         display: The display that shows it.
     """
 
@@ -161,7 +161,7 @@ class _ShownCloud:
         self._frame = ""
 
     def set_cloud(self, data: PreparedCloud, pose: NDArray[np.float64], frame: str) -> None:
-        """Take a cloud, its pose in the fixed frame, and its frame."""
+        """Set the cloud, its pose in the fixed frame, and its frame."""
         self._data, self._pose, self._frame = data, pose, frame
         self.points.pose = pose
         self._set_vertices(data)

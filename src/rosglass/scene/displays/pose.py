@@ -219,7 +219,7 @@ class _Covariance(NamedTuple):
 
     Attributes:
         pose: In its frame, 4 x 4.
-        covariance: Of x, y, z (m2) and rotations around x, y, z (rad2), 6 x 6.
+        covariance: Covariance of x, y, z (m2) and rotations around x, y, z (rad2), 6 x 6.
         problem: Why it is not drawn, and is 0 here; empty otherwise.
     """
 
@@ -243,9 +243,9 @@ class _Uncertainty(NamedTuple):
     """The shapes of one covariance: matrices, 4 x 4.
 
     Attributes:
-        ellipsoid: Of the position; None without one.
-        discs: Of the orientation, each with the axis whose end it is around.
-        cone: Of the orientation of a robot in the plane, instead; None without one.
+        ellipsoid: Matrix of the position; None without one.
+        discs: Matrices of the orientation, each with the axis whose end it surrounds.
+        cone: Matrix of the orientation of a robot in the plane, instead; None without one.
     """
 
     ellipsoid: NDArray[np.float64] | None

@@ -189,7 +189,7 @@ class _Loaded(NamedTuple):
         robot: Its description.
         visuals: For each link, what its visuals draw.
         collisions: The same of its collisions.
-        problems: What could not be loaded, in words, by the name of the mesh.
+        problems: Errors of loading, by the name of the mesh.
     """
 
     robot: Robot
@@ -345,7 +345,7 @@ def link_drawables(visual: Visual, problems: dict[str, str], files: MeshFiles) -
 
     Args:
         visual: The visual.
-        problems: What could not be loaded is added, by the name of the file.
+        problems: Receives errors of loading, by the name of the file.
         files: Reads meshes and textures.
     """
     geometry = visual.geometry
@@ -803,7 +803,7 @@ class RobotModelDisplay(Display):
     # -- files -----------------------------------------------------------------------------------
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file of either RViz, and which links it shows."""
+        """Apply the settings in a file of either RViz, and the visibility of links."""
         ours = {
             key: value
             for key, value in saved.items()

@@ -427,7 +427,7 @@ class Scene(Element):
 
     @Slot()
     def _on_tick(self) -> None:
-        """Look twice a second for displays whose frames are not updated any more."""
+        """Check twice a second for displays whose frames are no longer updated."""
         self._ticks += 1
         self._watch_time()
         if self._ticks % 5:
@@ -439,7 +439,7 @@ class Scene(Element):
             self._call(display, lambda one: one.check_frames())
 
     def _check_transforms(self) -> None:
-        """Say that none are received, that they are mixed, or that there is no fixed frame."""
+        """Report that none are received, that they are mixed, or that there is no fixed frame."""
         link, buffer, frame = self._link, self.transforms, self._fixed_frame
         problem = "" if link is None else link.problem
         if not problem and buffer is not None and not buffer.has_frame(frame):

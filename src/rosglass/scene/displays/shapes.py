@@ -34,7 +34,7 @@ def read_columns(elements: MessageSequence, *paths: str) -> NDArray[np.float64]:
 
     Args:
         elements: The elements, of constant size.
-        paths: Of the fields, e.g. ``position.x``.
+        paths: Paths of the fields, e.g. ``position.x``.
     """
     rows = elements.array
     out = np.empty((len(rows), len(paths)))
@@ -62,7 +62,7 @@ class AxesShapes(Group):
     """Red, green and blue cylinders along x, y and z of any number of poses.
 
     Args:
-        owner: What a pick of them finds.
+        owner: The result of picking them.
     """
 
     def __init__(self, owner: Any = None) -> None:
@@ -96,7 +96,7 @@ class ArrowShapes(Group):
     """Arrows along x of any number of poses: a shaft from their origin, then a head.
 
     Args:
-        owner: What a pick of them finds.
+        owner: The result of picking them.
     """
 
     def __init__(self, owner: Any = None) -> None:

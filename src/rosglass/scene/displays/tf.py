@@ -181,7 +181,7 @@ class TFDisplay(Display):
         self._draw()
 
     def load_settings(self, saved: Any) -> list[str]:
-        """Take the settings of a file, and which frames it shows."""
+        """Apply the settings in a file, and the visibility of frames."""
         refused = super().load_settings(saved) + self.parts.load(saved)
         self._draw()
         return refused
@@ -246,7 +246,7 @@ class TFDisplay(Display):
             self.on_transforms()  # what came during the Update Interval, as the last one
 
     def _report_refused(self) -> None:
-        """Say which transform was refused last, while there are any."""
+        """Report the last refused transform, while there are any."""
         buffer = self.scene.transforms if self.scene is not None else None
         if buffer is None or not self.shown:
             return
@@ -319,7 +319,7 @@ class TFDisplay(Display):
         self._took_s = time.monotonic() - self._looked_at
 
     def _report_unknown(self, unknown: Mapping[str, TransformException]) -> None:
-        """Say which frames have no transform, a line for each of the first ones."""
+        """Report frames without a transform, a line for each of the first ones."""
         lines = {name: f"no transform: {unknown[name]}" for name in list(unknown)[:_MAX_LINES]}
         if len(unknown) > _MAX_LINES:
             lines["Transforms"] = f"{len(unknown)} frames have no transform"

@@ -306,7 +306,7 @@ class TopicDisplay(Display):
         return min(age_s, time.monotonic() - self._placed_at) > LATE_S
 
     def check_frames(self) -> None:
-        """Say why nothing is received or shown, and try again to place what is late."""
+        """Report why nothing is received or shown, and try again to place late messages."""
         self._report_waiting()
         if self.shown and self._is_late():
             self._show_waiting()
@@ -328,7 +328,7 @@ class TopicDisplay(Display):
         return lambda message: message
 
     def _renew_preparer(self) -> None:
-        """Let further messages be decoded by changed settings, or for another renderer."""
+        """Decode further messages with changed settings, or for another renderer."""
         if self._queue is not None:
             self._queue.prepare = self.preparer()
 
@@ -425,8 +425,8 @@ class TopicDisplay(Display):
         """Show a message.
 
         Args:
-            data: What :meth:`preparer` has made of it.
-            pose: Of its frame in the fixed frame, at its time.
+            data: The result of :meth:`preparer`.
+            pose: Pose of its frame in the fixed frame, at its time.
             frame: Its frame.
             stamp: Its time in nanoseconds; 0 for the newest.
 
@@ -479,9 +479,9 @@ class _Kept(NamedTuple):
     """A message that is shown.
 
     Attributes:
-        data: What was read from it.
-        pose: Of its frame in the fixed frame.
-        group: What it draws.
+        data: The data read from it.
+        pose: Pose of its frame in the fixed frame.
+        group: Its drawables.
     """
 
     data: Any

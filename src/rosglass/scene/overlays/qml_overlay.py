@@ -127,7 +127,7 @@ class QmlOverlayDisplay(Display):
     # -- files -----------------------------------------------------------------------------------
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file, and what the overlay itself has kept in it."""
+        """Apply the settings in a file, and the ones that the overlay itself keeps in it."""
         refused = super().load_settings(saved)
         registered, free = saved.get(_CONFIGURATION), from_plain(saved.get(_CONFIG))
         self._registered = _as_text(registered) if isinstance(registered, dict) else {}

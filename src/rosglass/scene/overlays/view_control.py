@@ -102,7 +102,7 @@ class ViewControl(QtCore.QObject):
                 setting.of(self.view.settings).set(display.get(name))
 
     def set_2d(self, in_2d: bool) -> None:
-        """Look straight down, or not."""
+        """Set whether the camera looks straight down."""
         if not self._shows:
             self.view.set_mode(ViewMode.MODE_2D if in_2d else ViewMode.MODE_3D)
 

@@ -118,7 +118,7 @@ class ViewControllerDisplay(Display):
     # -- files -----------------------------------------------------------------------------------
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file."""
+        """Apply the settings in a file."""
         kept = {name: one for name, one in saved.items() if name not in (_TRACKED_FRAME, _MODE_2D)}
         return super().load_settings(kept)
 

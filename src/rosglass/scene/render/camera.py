@@ -204,7 +204,7 @@ class PinholeCamera(Camera):
 
     Attributes:
         focal: Focal lengths to the right and downwards, in units of the item.
-        centre: Where its axis is seen, in units of the item from its upper left corner.
+        centre: Position of the optical axis, in units of the item from its upper left corner.
 
     Raises:
         Error: A number is not finite, or a focal length is not above 0.

@@ -40,7 +40,7 @@ OPAQUE = 0.9998
 
 @dataclass(frozen=True, slots=True)
 class Coloring:
-    """How points get their colors, in the shader.
+    """The coloring of points in the shader.
 
     With the vertex's position and channel, the color is::
 
@@ -61,7 +61,7 @@ class Coloring:
         invert: Whether the rainbow is red at `high`.
         first: Color of flat points, or at `low`: red, green, blue from 0 to 1.
         last: Color at `high`.
-        axis: What x, y, z of a point in its own frame and 1 are multiplied with.
+        axis: Factors of x, y, z of a point in its own frame, and of 1.
         per_point_alpha: Whether points are as transparent as their channel says.
     """
 
@@ -81,8 +81,8 @@ class Points(Drawable):
     Attributes:
         data: All bytes.
         stride: Bytes from one point to the next, divisible by 4.
-        position: Where x, y, z (float32) are in a row.
-        channel: Where the channel is in a row; -1 for none.
+        position: Offset of x, y, z (float32) in a row.
+        channel: Offset of the channel in a row; -1 without one.
         channel_is_bytes: Whether the channel is four bytes B, G, R, A; otherwise one float32.
         style: ``points`` (pixels), ``squares``, ``flat squares``, ``spheres``, ``boxes`` (metres),
             ``tiles`` (squares in the plane of their own frame, metres).
@@ -115,7 +115,7 @@ class Points(Drawable):
         channel_is_bytes: bool = False,
         box: tuple[ArrayLike, ArrayLike] | None = None,
     ) -> None:
-        """Take bytes, without a copy.
+        """Set the vertices from bytes, without a copy.
 
         Args:
             data: Anything with the buffer protocol; kept, and never to be changed again.
@@ -148,7 +148,7 @@ class Points(Drawable):
             self._box = (np.asarray(box[0], np.float64), np.asarray(box[1], np.float64))
 
     def set_points(self, points: ArrayLike, colors: ArrayLike | None = None) -> None:
-        """Take positions of shape (n, 3) in metres, and RGBA for each or all."""
+        """Set positions of shape (n, 3) in metres, and RGBA for each or all."""
         xyz = rows_of("points", points, (3,))
         rows = np.zeros((len(xyz), 4), np.float32)
         rows[:, :3] = xyz
@@ -247,7 +247,7 @@ class Lines(Drawable):
         colors: ArrayLike = (1.0, 1.0, 1.0, 1.0),
         neighbours: NDArray[np.float32] | None = None,
     ) -> None:
-        """Take lines.
+        """Set the lines.
 
         Args:
             segments: Shape (n, 2, 3), metres.
@@ -274,7 +274,7 @@ class Lines(Drawable):
         self.changed(geometry=True)
 
     def set_strip(self, points: ArrayLike, colors: ArrayLike = (1.0, 1.0, 1.0, 1.0)) -> None:
-        """Take a line through points of shape (n, 3), with a colour for all or for each point."""
+        """Set one line through points of shape (n, 3), with a colour for all or for each point."""
         line = rows_of("points", points, (3,))
         given = np.asarray(colors)
         if given.ndim == 2 and len(given) == len(line):
@@ -307,7 +307,7 @@ class Mesh(Drawable):
     """A shape, drawn once or many times.
 
     Attributes:
-        shape: What is drawn.
+        shape: The shape.
         instances: A row for each time: matrix (float32, 16, column by column), RGBA (float32, 4).
         lit: Whether the headlight shades it.
         texture: Pixels (h, w, 4) of uint8, or None.
@@ -414,7 +414,7 @@ class MapImage(Drawable):
         self.layer = -1
 
     def set_cells(self, cells: NDArray[np.uint8], resolution: float) -> None:
-        """Take cells of a size in metres.
+        """Set cells of a size in metres.
 
         Raises:
             Error: They are not bytes in two dimensions of up to 16384, or the size is not positive.
@@ -430,7 +430,7 @@ class MapImage(Drawable):
         self.changed(geometry=True)
 
     def set_palette(self, palette: NDArray[np.uint8]) -> None:
-        """Take the colours, (256, 4) RGBA bytes."""
+        """Set the colours, (256, 4) RGBA bytes."""
         palette = np.asarray(palette)
         if palette.shape != (256, 4) or palette.dtype != np.uint8:
             raise Error(f"palette: expected 256 x 4 bytes, got {palette.shape} of {palette.dtype}")
@@ -461,7 +461,7 @@ class Labels(Drawable):
         texts: One for each; several lines are allowed.
         extents: (n, 2), letters of the longest line of each, and how many lines it has.
         positions: (n, 3), metres; where the middle of each is, or of its left or upper edge.
-        heights: Of a line, in metres, or in pixels of the screen.
+        heights: Height of a line, in metres, or in pixels of the screen.
         colors: (n, 4) RGBA bytes.
         in_pixels: Whether `heights` are pixels.
         align: ``centre``, ``left`` or ``below``.
@@ -492,7 +492,7 @@ class Labels(Drawable):
         heights: ArrayLike = 0.1,
         colors: ArrayLike = (1.0, 1.0, 1.0, 1.0),
     ) -> None:
-        """Take texts, positions (n, 3), heights and colours for each or all.
+        """Set texts, positions (n, 3), heights and colours for each or all.
 
         Raises:
             Error: There are not as many positions, or more than 2000.

@@ -85,7 +85,7 @@ class GraphicsDevice:
     Args:
         rhi: Qt's.
         samples: Samples for each pixel of the target.
-        target: What is drawn into.
+        target: The render target.
     """
 
     def __init__(self, rhi: QRhi, samples: int, target: Any) -> None:
@@ -176,7 +176,7 @@ class GraphicsDevice:
         """Upload an image of (h, w) or (h, w, 4) bytes; one that is too large is reduced.
 
         Args:
-            batch: What uploads it.
+            batch: The batch that uploads it.
             pixels: The image.
             old: Its texture, which another one replaces if it has another size; None for none.
             rows: The first row that has changed, and the one after the last; None for all.
@@ -258,7 +258,7 @@ class GraphicsDevice:
                 each attribute. Formats are named, for Python hashes strings much faster than enums.
             topology: Name of what the vertices are.
             blend: Whether it is translucent; it does not hide what is behind it then.
-            bindings: Of any drawable of this kind.
+            bindings: Bindings of any drawable of this kind.
             cull: Whether triangles are drawn from their outer side only.
         """
         key = (shaders, layout, topology, blend, cull)

@@ -91,7 +91,7 @@ class Shape:
 
     @property
     def size(self) -> int:
-        """How many bytes it takes."""
+        """Its size in bytes."""
         return self.rows.nbytes + self.faces.nbytes
 
     def mirrored(self) -> Shape:

@@ -162,7 +162,7 @@ class _OnDevice:
         raise NotImplementedError
 
     def bind(self, *images: tuple[QRhiTexture, QRhiSampler]) -> None:
-        """Let the shaders read other images."""
+        """Bind other images to the shaders."""
         old, self.bound = self.bound, self.device.bindings(self.block, *images)
         self.device.free(old)
 
@@ -616,7 +616,7 @@ class SceneRenderer(QQuickRhiItemRenderer):
         self.update()
 
     def synchronize(self, item: QQuickRhiItem) -> None:  # noqa: ARG002 - Qt's signature
-        """Take the next frame; the GUI thread waits."""
+        """Receive the next frame; the GUI thread waits."""
         self._take()
 
     def _take(self) -> None:

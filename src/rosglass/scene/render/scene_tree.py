@@ -71,7 +71,7 @@ class Item:
             item = item.parent
 
     def remove(self) -> None:
-        """Take it out of its group; safe to call twice."""
+        """Remove it from its group; safe to call twice."""
         if self.parent is not None:
             self.parent.discard(self)
 
@@ -149,14 +149,14 @@ class Group(Item):
         self.touch()
 
     def discard(self, item: Item) -> None:
-        """Take an item out, if it is in."""
+        """Remove an item, if it is in the group."""
         if item in self._items:
             del self._items[item]
             item.parent = None
             self.touch()
 
     def clear(self) -> None:
-        """Take everything out."""
+        """Remove all items."""
         for item in self:
             item.parent = None
         if self._items:
@@ -186,7 +186,7 @@ class Drawable(Item):
     """Data of one kind that is drawn at once.
 
     Attributes:
-        owner: What a pick of it finds; None where it cannot be picked.
+        owner: The result of picking it; None if it cannot be picked.
         geometry: Counts changes of the data that the renderer uploads.
         look: Counts changes of colours, sizes and the like, which are few numbers.
         count: How many of its kind there are; nothing is drawn for 0.

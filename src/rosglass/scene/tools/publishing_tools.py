@@ -91,7 +91,7 @@ class PublishingTool(Tool):
     # -- files -----------------------------------------------------------------------------------
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file of either RViz."""
+        """Apply the settings in a file of either RViz."""
         refused = super().load_settings({k: v for k, v in saved.items() if k != "Topic"})
         try:
             found = read_topic(saved)
@@ -161,8 +161,8 @@ class PublishingTool(Tool):
         A new publisher waits up to two seconds for its first subscriber.
 
         Args:
-            fields: Of the message.
-            text: What it is, for the status bar, e.g. ``Goal at [1, 2]``.
+            fields: Fields of the message.
+            text: Description for the status bar, e.g. ``Goal at [1, 2]``.
         """
         self._drop("another one followed")
         self._run_update()  # the topic may just have been set
@@ -286,7 +286,7 @@ class PoseTool(PublishingTool):
         self.root.add(self._arrow)
 
     def activate(self) -> None:
-        """Say what to do."""
+        """Show the instructions."""
         super().activate()
         self.set_status(self._HELP, hit=True)
 
@@ -383,7 +383,7 @@ class SetInitialPoseTool(PoseTool):
     )  # fmt: skip
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a file of either RViz."""
+        """Apply the settings in a file of either RViz."""
         refused = super().load_settings({k: v for k, v in saved.items() if "deviation" not in k})
         try:
             names = ("X std deviation", "Y std deviation", "Theta std deviation")
@@ -580,7 +580,7 @@ class PublishPointTool(PublishingTool):
     pointSet = Signal(MAP)
 
     def activate(self) -> None:
-        """Say what to do."""
+        """Show the instructions."""
         super().activate()
         self._show_help(None)
 

@@ -70,7 +70,7 @@ class _Marked(NamedTuple):
     Attributes:
         indices: Indices of its points, lines, instances or cells, in order.
         geometry: Its data when it was selected: new points are others.
-        whole: Whose only part all of it is, e.g. a link of a robot; None where each number is one.
+        whole: The owner if it is selected as a whole, e.g. a link of a robot; None otherwise.
     """
 
     indices: NDArray[np.intp]

@@ -40,10 +40,10 @@ class Tool(Configurable, Element):
 
     Attributes:
         TYPE: Its name in RViz, e.g. ``Measure``; empty for own tools.
-        NAME: What its button says.
+        NAME: Text of its button.
         KEY: The key that selects it.
-        DESCRIPTION: What it is for.
-        root: What it draws, in the fixed frame.
+        DESCRIPTION: Its purpose.
+        root: Its drawables, in the fixed frame.
         view: The view that it is in; None before.
     """
 
@@ -222,7 +222,7 @@ class Tool(Configurable, Element):
 
         Args:
             key: The character.
-            event: Where the mouse is.
+            event: The event of the mouse.
         """
         return False
 
@@ -246,7 +246,7 @@ class Tool(Configurable, Element):
         """Return to the default tool, if this one is the current one.
 
         Args:
-            outcome: What it has done, for the status bar.
+            outcome: The outcome, for the status bar.
         """
         if self._tools is not None:
             self._tools.finish(self, outcome)

@@ -131,7 +131,7 @@ class Tools(QtCore.QObject):
         Args:
             tool: A tool, its class, or the name of its type in RViz or a class id, e.g.
                 ``SetGoal`` or ``rviz/SetGoal``.
-            name: What its button says; that of the type by default.
+            name: Text of its button; by default the type's.
             settings: Values of its properties, e.g. ``topic="/robot1/goal_pose"``.
 
         Raises:

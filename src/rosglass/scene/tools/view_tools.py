@@ -112,7 +112,7 @@ class InteractTool(MoveCameraTool):
         return self.statusText or super().help(modifiers)
 
     def on_press(self, event: PointerEvent) -> bool:
-        """Give the press to what is under the mouse, if it handles it."""
+        """Pass the press to the object under the mouse, if it handles presses."""
         self._focus(event)
         return self._focused is not None and self._focused.handle_pointer("press", event)
 
@@ -129,7 +129,7 @@ class InteractTool(MoveCameraTool):
             self._focused.handle_pointer("release", event)
 
     def on_wheel(self, event: PointerEvent, wheel: Wheel) -> bool:  # noqa: ARG002
-        """Give the wheel to what is under the mouse."""
+        """Pass the wheel to the object under the mouse."""
         return self._focused is not None and self._focused.handle_pointer("wheel", event)
 
     def on_cancel(self) -> None:
@@ -164,7 +164,7 @@ class FocusCameraTool(Tool):
     DESCRIPTION = "A click turns the camera towards a point."
 
     def activate(self) -> None:
-        """Say what to do."""
+        """Show the instructions."""
         self.set_status("Left-Click: Focus on a point.", hit=False)
 
     def on_move(self, event: PointerEvent) -> None:
@@ -176,7 +176,7 @@ class FocusCameraTool(Tool):
             self.set_status(f"Left-Click: Focus on this point. {point}", hit=True)
 
     def on_release(self, event: PointerEvent) -> None:
-        """Look at the point; where there is none, in its direction."""
+        """Turn the camera to the clicked point, or in its direction if nothing is there."""
         if self.view is None:
             return
         target = event.point
@@ -221,7 +221,7 @@ class MeasureTool(Tool):
         self._show_help(hit=False)
 
     def on_press(self, event: PointerEvent) -> bool:
-        """Take both buttons."""
+        """Use both buttons."""
         return event.button in (Button.LEFT, Button.RIGHT)
 
     def on_move(self, event: PointerEvent) -> None:
@@ -231,7 +231,7 @@ class MeasureTool(Tool):
         self._show_help(hit=event.point is not None)
 
     def on_release(self, event: PointerEvent) -> None:
-        """Take the point."""
+        """Use the clicked point."""
         if event.button is Button.RIGHT:
             self.clear()
         elif event.point is not None:
@@ -305,7 +305,7 @@ class SelectTool(Tool):
         super().__init__(parent, runtime)
 
     def activate(self) -> None:
-        """Say what to do."""
+        """Show the instructions."""
         self.set_status(self._HELP, hit=True)
 
     def deactivate(self) -> None:
@@ -359,7 +359,7 @@ class SelectTool(Tool):
             self._rectangle.setVisible(False)
 
     def on_key(self, key: str, event: PointerEvent) -> bool:  # noqa: ARG002
-        """Look at the selection (F)."""
+        """Turn the camera to the selection (F)."""
         view = self.view
         middle = None if view is None or key not in "fF" else view.selection.middle()
         if view is None or middle is None:

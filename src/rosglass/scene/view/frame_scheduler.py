@@ -1,4 +1,4 @@
-"""When a view is drawn, and by which renderers.
+"""Schedules the frames of a view, and owns its renderers.
 
 It is drawn when something has changed. Where the processor draws, changes of the scene wait after a
 frame for as long as that took, so that QML has half of the time.

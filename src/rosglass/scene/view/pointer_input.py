@@ -73,7 +73,7 @@ class PointerInput(QtCore.QObject):
         return PointerEvent(self._view, (at.x(), at.y()), moved, modifiers=held)
 
     def press(self, event: Any) -> None:
-        """Give a press to the tool, or start to drag the camera."""
+        """Pass a press to the tool, or start to drag the camera."""
         if self._view.focusOnClick:
             self._view.forceActiveFocus(QtCore.Qt.FocusReason.MouseFocusReason)
         self._view.stop_turning()
@@ -83,7 +83,7 @@ class PointerInput(QtCore.QObject):
             self._view.show_focal_shape()
 
     def move(self, event: Any) -> None:
-        """Give a drag to the tool, or drag the camera."""
+        """Pass a drag to the tool, or drag the camera."""
         self._tools.on_move(self._event(event))
         event.accept()
 
@@ -136,7 +136,7 @@ class PointerInput(QtCore.QObject):
         event.accept()
 
     def touch(self, event: Any) -> None:
-        """Let one finger be the tool's left button; otherwise rotate, move and zoom by fingers."""
+        """Treat one finger as the tool's left button; else rotate, move and zoom by fingers."""
         event.accept()
         self._view.stop_turning()
         self.touched_at = time.monotonic()

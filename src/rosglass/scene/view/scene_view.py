@@ -316,7 +316,7 @@ class SceneView(QQuickRhiItem):
     # -- displays and tools ----------------------------------------------------------------------
 
     def componentComplete(self) -> None:
-        """Take the displays and tools that were declared, and select the tool that is wanted.
+        """Add declared displays and tools, and select the requested tool.
 
         Now, not from the event loop: a program may load a config next, which replaces them.
         """
@@ -332,7 +332,7 @@ class SceneView(QQuickRhiItem):
             self._set_tool(wanted)
 
     def adopt_tool(self, tool: Tool) -> None:
-        """Take a tool that QML has declared inside this view."""
+        """Add a tool that QML has declared inside this view."""
         self._tools.adopt(tool, declared=True)
 
     @Slot()
@@ -364,7 +364,7 @@ class SceneView(QQuickRhiItem):
             self.show_view(made)
 
     def show_view(self, view: ViewController) -> None:
-        """Look through another view.
+        """Switch to another view controller.
 
         Raises:
             ArgumentError: `view` is not a ViewController.
@@ -462,7 +462,7 @@ class SceneView(QQuickRhiItem):
         return ViewConfig.new(view.TYPE, ros, name=name, settings=view.state())
 
     def show_saved_view(self, index: int) -> list[str]:
-        """Look through a saved view.
+        """Switch to a saved view.
 
         Returns:
             Settings of it that were left out, a line each.
@@ -510,7 +510,7 @@ class SceneView(QQuickRhiItem):
 
     @Slot(int, result=str)
     def showSavedView(self, index: int) -> str:
-        """Look through a saved view; return what is wrong with it, or an empty text."""
+        """Switch to a saved view; return its problem, or an empty text."""
         try:
             return "; ".join(self.show_saved_view(index))
         except Error as error:
@@ -632,7 +632,7 @@ class SceneView(QQuickRhiItem):
         self.camera_moved()
 
     def stop_turning(self) -> None:
-        """Look at once from where the camera turns to."""
+        """End a turn of the camera at its goal at once."""
         self._turn = None
         self._turning.stop()
 
@@ -655,7 +655,7 @@ class SceneView(QQuickRhiItem):
 
     @Slot()
     def _on_placed(self) -> None:
-        """Let the camera follow its target frame."""
+        """Move the camera with its target frame."""
         scene, view = self.scene, self._view
         if view.target_frame != FIXED_FRAME:
             pose, reason = None, ""
@@ -732,7 +732,7 @@ class SceneView(QQuickRhiItem):
         QtCore.QTimer.singleShot(0, self, lambda: self.set_problem(problem))
 
     def set_problem(self, problem: str) -> None:
-        """Say why nothing is drawn; empty once it is."""
+        """Report why nothing is drawn; empty once something is."""
         if is_alive(self) and problem != self._problem:
             self._problem = problem
             self.problemChanged.emit()
@@ -742,11 +742,11 @@ class SceneView(QQuickRhiItem):
     # -- mouse, touch, keys ----------------------------------------------------------------------
 
     def mousePressEvent(self, event: Any) -> None:
-        """Give a press to the tool, or start to drag the camera."""
+        """Pass a press to the tool, or start to drag the camera."""
         self._input.press(event)
 
     def mouseMoveEvent(self, event: Any) -> None:
-        """Give a drag to the tool, or drag the camera."""
+        """Pass a drag to the tool, or drag the camera."""
         self._input.move(event)
 
     def mouseReleaseEvent(self, event: Any) -> None:
@@ -777,7 +777,7 @@ class SceneView(QQuickRhiItem):
         self._input.wheel(event)
 
     def touchEvent(self, event: Any) -> None:
-        """Let one finger be the tool's left button; otherwise rotate, move and zoom by fingers."""
+        """Treat one finger as the tool's left button; else rotate, move and zoom by fingers."""
         self._input.touch(event)
 
     def touchUngrabEvent(self) -> None:

@@ -179,7 +179,7 @@ class ViewController:
         return dict(sorted({**copy.deepcopy(self._unknown), **found}.items()))
 
     def restore(self, state: Mapping[str, Any]) -> list[str]:
-        """Take the settings of a ``.rviz`` file; what it does not have stays as it is.
+        """Apply the settings in a ``.rviz`` file; others stay as they are.
 
         Args:
             state: As from :meth:`state`, of RViz 1 or 2. Unknown keys are kept.

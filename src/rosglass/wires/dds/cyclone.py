@@ -383,7 +383,7 @@ def assert_liveliness(entity: int, place: str) -> None:
 
 
 class RepeatedBytes:
-    """How many bytes a writer has repeated because readers asked for them.
+    """Return the number of bytes that a writer has repeated at the request of readers.
 
     Args:
         writer: The writer.
@@ -840,7 +840,7 @@ class Discovered:
 
 
 def take(reader: int, topic: BuiltinTopic, place: str) -> list[Discovered]:
-    """Take some samples of a built-in topic, the oldest first; empty if there are none."""
+    """Return some samples of a built-in topic, the oldest first; empty if there are none."""
     samples = (c_void_p * _ROOM)()
     infos = (_Info * _ROOM)()
     lib = library()

@@ -299,7 +299,7 @@ class DdsGraph:
 
     @property
     def peers(self) -> int:
-        """How many other participants are in the domain."""
+        """Number of other participants in the domain."""
         return len(self._participants) - (self._own in self._participants)
 
     def prefixes(self) -> list[bytes]:
@@ -308,7 +308,7 @@ class DdsGraph:
 
     @property
     def unnamed(self) -> int:
-        """How many other ROS 2 participants have not announced their nodes, or only just did.
+        """Number of other ROS 2 participants that have not announced their nodes, or only just did.
 
         Fast DDS announces them 1 to 4 s after its discovery; endpoints may follow a moment later.
         """

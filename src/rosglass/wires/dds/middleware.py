@@ -95,12 +95,12 @@ class DdsDiscovery:
 
     @property
     def peers(self) -> int:
-        """How many other participants are in the domain."""
+        """Number of other participants in the domain."""
         return self._seen.peers
 
     @property
     def unnamed(self) -> int:
-        """How many other participants have not announced their nodes."""
+        """Number of other participants that have not announced their nodes."""
         return self._seen.unnamed
 
     def show(self, endpoint: EndpointInfo) -> None:

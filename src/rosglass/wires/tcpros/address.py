@@ -122,7 +122,7 @@ def parse_uri(uri: str, what: str) -> tuple[str, int]:
 
     Args:
         uri: Such as ``http://robot:11311/``.
-        what: What the URI is of, for the error.
+        what: The owner of the URI, for the error.
     """
     try:
         parts = urlsplit(uri)

@@ -647,7 +647,7 @@ class Connection:
 
     @property
     def lost(self) -> int:
-        """How many frames were dropped for newer ones, or expired."""
+        """Number of frames that were replaced by newer ones, or expired."""
         return self._outgoing.lost
 
     @property
@@ -662,7 +662,7 @@ class Connection:
 
     @property
     def received(self) -> int:
-        """How many bytes were received."""
+        """Number of received bytes."""
         return self._incoming.total
 
     def waiting(self) -> int:

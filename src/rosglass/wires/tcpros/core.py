@@ -219,7 +219,7 @@ class BlockingPool:
     """Runs jobs that may take seconds on daemon threads, several at a time.
 
     Args:
-        name: Of the threads.
+        name: Name of the threads.
     """
 
     # Not concurrent.futures: that joins its threads at exit, and a program would wait up to 5 s

@@ -263,7 +263,7 @@ def listen(interface: str, port: int, url: str) -> socket.socket:
         interface: This machine's address to listen on; ``0.0.0.0`` for all of IPv4, ``::`` for all
             of both versions.
         port: 0 for any.
-        url: What the node was connected with, for the error.
+        url: The node's connection URL, for the error.
 
     Raises:
         ConnectionLostError: The port is taken, or not allowed.

@@ -395,7 +395,7 @@ class ServiceLink:
         type: The service type.
         location: The server's location.
         is_current: Whether that was looked up after the call for which the connection was made.
-        peer: What the server announces; None until its header is received.
+        peer: The server's announcement; None until its header is received.
         refusal: Why the server refuses the connection; empty if it does not.
         request: The call that it is used for; None when it is idle.
         settling: Whether data received with the last response is still being handled.
@@ -492,7 +492,7 @@ class ServiceFinder:
 
     Attributes:
         type: The service type; None while it is unknown.
-        peer: What the server announced; None when no server is known.
+        peer: The server's announcement; None while no server is known.
         location: The server's location; None when unknown.
         asked: Monotonic time of the last lookup; 0 when the server must be looked up again.
     """

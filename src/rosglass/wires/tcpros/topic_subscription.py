@@ -667,7 +667,7 @@ class PublisherLink:
 
     @property
     def received(self) -> int:
-        """How many bytes were received on this connection."""
+        """Number of bytes received on this connection."""
         connection = self._connection
         return 0 if connection is None else connection.received
 

@@ -122,7 +122,7 @@ class Owner(Protocol):
         """
 
     def wake(self) -> None:
-        """Have declarations polled soon; from any thread."""
+        """Poll declarations soon; from any thread."""
 
     def status(self) -> Status:
         """Return the state of the connection."""

@@ -289,7 +289,7 @@ class ZenohMiddleware(Middleware):
         return self._names.get(gid)
 
     def wake(self) -> None:
-        """Have declarations polled soon."""
+        """Poll declarations soon."""
         self._changed()
 
     def is_linked(self) -> bool:
@@ -387,7 +387,7 @@ class ZenohMiddleware(Middleware):
                 self._increase_version()
 
     def _look_for_refusal(self) -> None:
-        """Look why there is no router, in a thread of its own: it may wait for a name server."""
+        """Find out why there is no router; in its own thread, as it may wait for a name server."""
         with self._lock:
             linked, now = any(self._links.values()), time.monotonic()
             if linked:

@@ -35,7 +35,7 @@ _PASSWORD = re.compile(r"(//[^/?#@]*?:)(?:[^/?#]*|(?!\d+(?:[/?#]|$)).*)@")
 
 @dataclass(frozen=True)
 class ZenohOptions:
-    """How to join a domain over Zenoh.
+    """Options for joining a domain over Zenoh.
 
     Attributes:
         host: Router's host name or address; None for that of `config_file`, or this machine.
