@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from point_clouds import packed_color, point_cloud2, random_points
 
-from rosglass.errors import ArgumentError, DecodeError, Error
+from rosglass.errors import DecodeError, Error
 from rosglass.messages import load
 from rosglass.scene.data.point_clouds import (
     Channel,
@@ -187,7 +187,10 @@ def test_hostile_bytes_raise_errors_of_rosglass_only() -> None:
         broken["data"] = message["data"][: int(random.choice([96, 96, 95, 48, 0]))]
         try:
             found = Cloud.from_message(broken)
-            vertices = found.vertex_data(COLOR)
+            # As the color transformers do, which say what they support.
+            color = found.layout.find("rgb")
+            is_usable = color is not None and color.is_packed_color
+            vertices = found.vertex_data(COLOR if is_usable else None)
             found.bounds()
             order_points(found, vertices)
             assert vertices.data.nbytes <= 1000
@@ -195,33 +198,6 @@ def test_hostile_bytes_raise_errors_of_rosglass_only() -> None:
         except Error:
             continue
     assert survived > 20
-
-
-def test_an_unknown_datatype_matters_only_where_it_is_used() -> None:
-    message = point_cloud2(random_points(3), point_step=16)
-    message["fields"].append(field("new", 12, 99))
-    found = Cloud.from_message(message)
-    assert np.shares_memory(found.vertex_data().data, found.data)
-    assert found.layout.find_channel("new") is None
-    assert found.describe_point(0)[1] == ("3: new", "(datatype 99)")
-    with pytest.raises(DecodeError, match="'new' has datatype 99"):
-        found.values("new")
-
-
-def test_questions_about_missing_fields_and_points_are_refused() -> None:
-    found = cloud()
-    for call in (found.values, found.channel_range):
-        with pytest.raises(ArgumentError, match="its fields are x, y, z"):
-            call("ring")
-    with pytest.raises(ArgumentError):
-        found.vertex_data(Channel(("ring",)))
-    with pytest.raises(ArgumentError):
-        found.vertex_data(Channel(("ring",), is_color=True))
-    for index in (-1, 6):
-        with pytest.raises(ArgumentError, match="from 0 to 5"):
-            found.describe_point(index)
-        with pytest.raises(ArgumentError, match="from 0 to 5"):
-            found.vertex_data().point_index(index)
 
 
 # ---- vertices
@@ -384,8 +360,6 @@ def test_random_clouds_are_ordered_by_cells() -> None:
         return float(np.median(np.linalg.norm(np.diff(points, axis=0), axis=1)))
 
     assert jump(positions(ordered)) < jump(found.positions()) / 4
-    with pytest.raises(ArgumentError):
-        order_points(found, ordered)
 
 
 def test_rows_of_a_scanner_are_ordered_already() -> None:
@@ -477,31 +451,3 @@ def test_entries_keep_the_pose_of_their_stamp() -> None:
     for at, pose in enumerate(poses):
         history.add(cloud(), pose, at)
     assert [entry.transform.tolist() for entry in history.entries] == [p.tolist() for p in poses]
-
-
-@pytest.mark.parametrize("limits", [{"max_points": 14}, {"max_bytes": 14 * 12}])
-def test_a_history_is_limited_and_says_so(limits: dict[str, int]) -> None:
-    history = CloudHistory(60.0, **limits)
-    for at in range(5):
-        entry, _ = history.add(cloud(), IDENTITY, float(at))
-    assert [entry.received_s for entry in history.entries] == [3.0, 4.0]
-    assert "Decay Time 60 s" in history.warning
-    assert "2 clouds (1.0 s, 12 points)" in history.warning
-    # One cloud beyond the limits is shown nevertheless.
-    entry, removed = history.add(cloud(random_points(50)), IDENTITY, 9.0)
-    assert (history.entries, len(removed)) == ((entry,), 2)
-    history.decay_time_s = 0
-    assert history.warning == ""
-
-
-def test_a_history_refuses_bad_numbers() -> None:
-    for value in (-1, float("nan"), float("inf"), "1"):
-        with pytest.raises(ArgumentError, match="decay_time_s"):
-            CloudHistory(value)
-    history = CloudHistory()
-    for pose in (np.eye(3), np.full((4, 4), np.nan), "pose", None):
-        with pytest.raises(ArgumentError, match="transform"):
-            history.add(cloud(), pose, 0.0)
-    with pytest.raises(ArgumentError, match="received_s"):
-        history.add(cloud(), IDENTITY, float("nan"))
-    assert history.entries == ()

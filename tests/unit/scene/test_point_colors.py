@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from point_clouds import packed_color, point_cloud2, random_points
 
-from rosglass.errors import ArgumentError
 from rosglass.scene.data.point_clouds import Channel, Cloud
 from rosglass.scene.render.point_colors import (
     COLOR_TRANSFORMERS,
@@ -275,23 +274,3 @@ def test_the_shaders_formulas_give_the_same_colors() -> None:
         ]
         difference = colors.of_points(found) - np.array(expected) * 255
         assert np.abs(difference).max() < 1.01, transformer
-
-
-@pytest.mark.parametrize(
-    ("make", "name"),
-    [
-        (lambda: FlatColor((1, 1)), "color"),
-        (lambda: FlatColor((1, 1, 2)), "color"),
-        (lambda: FlatColor(None), "color"),
-        (lambda: FlatColor((1, 1, float("nan"))), "color"),
-        (lambda: Intensity(min_color="red"), "min_color"),
-        (lambda: Intensity(max_intensity=float("inf")), "max_intensity"),
-        (lambda: Intensity(min_intensity="0"), "min_intensity"),
-        (lambda: AxisColor("z"), "axis"),
-        (lambda: AxisColor(min_value=float("nan")), "min_value"),
-        (lambda: AxisColor().colors(line(1), np.eye(3)), "transform"),
-    ],
-)
-def test_bad_settings_are_refused(make: Any, name: str) -> None:
-    with pytest.raises(ArgumentError, match=f"^{name}: "):
-        make()

@@ -354,9 +354,6 @@ def test_a_touch_is_the_movement_of_its_fingers() -> None:
     one = Touch.between([(1, 1)], [(4, 5)], SIZE)
     assert one == (1, 4, 5, 3, 4, 1, 0, SIZE)
     assert Touch.between([(3, 3), (3, 3)], [(0, 3), (900, 3)], SIZE).pinch == 10
-    for before, after in (([], []), ([(0, 0)], [(0, 0), (1, 1)])):
-        with pytest.raises(Error, match="same fingers"):
-            Touch.between(before, after, SIZE)
 
 
 def test_one_finger_turns_as_the_left_button_does() -> None:

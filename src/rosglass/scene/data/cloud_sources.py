@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rosglass.errors import ArgumentError, DecodeError, shown
+from rosglass.errors import DecodeError, shown
 from rosglass.images.encodings import ENCODINGS, RawImage, pixels_of
 from rosglass.messages import MessageSequence
 from rosglass.scene.data.point_clouds import (
@@ -55,13 +55,9 @@ def cloud_from_columns(columns: Mapping[str, Any], warnings: Sequence[str] = ())
         warnings: Texts for the display's status.
 
     Raises:
-        ArgumentError: Lengths differ, or an array has other than numbers.
         DecodeError: There is no x, y or z.
     """
-    arrays = {name: _column(name, value) for name, value in columns.items()}
-    shapes = {array.shape for array in arrays.values()}
-    if len(shapes) > 1 or any(len(shape) != 1 for shape in shapes):
-        raise ArgumentError("columns", sorted(shapes), "arrays of one length")
+    arrays = {name: _column(value) for name, value in columns.items()}
     count = len(next(iter(arrays.values()))) if arrays else 0
     values = np.empty((count, len(arrays)), np.uint32)
     for index, array in enumerate(arrays.values()):
@@ -80,14 +76,10 @@ def _cloud(types: Mapping[str, Any], values: Array, warnings: Sequence[str] = ()
     return Cloud(layout, values.reshape(-1).view(np.uint8), warnings)
 
 
-def _column(name: str, value: Any) -> Array:
-    try:
-        array = np.asarray(value)
-        with np.errstate(over="ignore", invalid="ignore"):
-            dtype = np.uint32 if array.dtype == np.uint32 else np.float32
-            return array.astype(dtype, copy=False)
-    except (TypeError, ValueError):
-        raise ArgumentError(name, value, "an array of numbers") from None
+def _column(value: Any) -> Array:
+    array = np.asarray(value)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return array.astype(np.uint32 if array.dtype == np.uint32 else np.float32, copy=False)
 
 
 def cloud_from_point_cloud(message: Any) -> Cloud:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rosglass.errors import ArgumentError, DecodeError, FieldPathError, shown
+from rosglass.errors import DecodeError, FieldPathError, shown
 from rosglass.messages import Message
 
 if TYPE_CHECKING:
@@ -37,14 +37,12 @@ __all__ = [
     "CloudHistory",
     "CloudLayout",
     "VertexData",
-    "check_finite",
     "is_ordered",
     "order_points",
     "read_bytes",
     "read_field",
     "read_integer",
     "read_sequence",
-    "to_matrix",
     "to_unorm",
 ]
 
@@ -312,13 +310,7 @@ class VertexData:
     order: NDArray[np.intp] | None = None
 
     def point_index(self, vertex: int) -> int:
-        """Return the number in the cloud of a vertex's point, e.g. of a picked one.
-
-        Raises:
-            ArgumentError: There is no such vertex.
-        """
-        if not 0 <= vertex < self.count:
-            raise ArgumentError("vertex", vertex, f"a number from 0 to {self.count - 1}")
+        """Return the number in the cloud of a vertex's point, e.g. of a picked one."""
         return vertex if self.order is None else int(self.order[vertex])
 
 
@@ -396,14 +388,10 @@ class Cloud:
             rows are padded.
 
         Raises:
-            ArgumentError: There is no such field.
             DecodeError: Its type code is unknown.
         """
         field = self.layout.find(name)
-        if field is None:
-            raise ArgumentError(
-                "name", name, f"a field of the cloud; {self.layout.describe_fields()}"
-            )
+        assert field is not None, name
         return self._view(field.offset, field.dtype(self.layout.is_bigendian), field.count)
 
     def _view(self, offset: int, dtype: np.dtype[Any], count: int = 1) -> Array:
@@ -462,7 +450,6 @@ class Cloud:
         """Return the smallest and largest finite value of a field over the visible points.
 
         Raises:
-            ArgumentError: There is no such field.
             DecodeError: Its type code is unknown.
         """
         if name not in self._ranges:
@@ -502,9 +489,6 @@ class Cloud:
 
         Args:
             channel: The channel that colors need; None for positions alone.
-
-        Raises:
-            ArgumentError: The cloud does not have the channel's fields.
         """
         is_bytes = channel is not None and channel.is_color
         offsets = self._direct_offsets(channel)
@@ -549,16 +533,11 @@ class Cloud:
         return (x.offset, field.offset) if usable else None
 
     def color_bytes(self, channel: Channel) -> NDArray[np.uint8]:
-        """Return a channel that is a color, as points x (blue, green, red, alpha).
-
-        Raises:
-            ArgumentError: The cloud lacks the channel's fields, or they are not colors.
-        """
+        """Return a channel that is a color, as points x (blue, green, red, alpha)."""
         names = channel.fields
         if len(names) == 1:
             field = self.layout.find(names[0])
-            if field is None or not field.is_packed_color:
-                raise ArgumentError("channel", names[0], "a field of 4 bytes, as rgb and rgba")
+            assert field is not None, names[0]
             order = ">u4" if self.layout.is_bigendian else "<u4"
             bits = np.ascontiguousarray(self._view(field.offset, np.dtype(order)), "<u4")
             out = bits.view(np.uint8).reshape(-1, 4)
@@ -577,12 +556,7 @@ class Cloud:
 
         The position is the first; names of others have the number of the field, as in RViz. Packed
         colors are r, g, b, a from 0 to 255.
-
-        Raises:
-            ArgumentError: There is no such point.
         """
-        if not 0 <= index < self.point_count:
-            raise ArgumentError("index", index, f"a number from 0 to {self.point_count - 1}")
         layout = self.layout
         row, column = divmod(index, layout.width)
         start = row * layout.row_step + column * layout.point_step
@@ -680,12 +654,7 @@ def order_points(cloud: Cloud, vertices: VertexData) -> VertexData:
     Args:
         cloud: The cloud.
         vertices: Its vertices in the cloud's own order.
-
-    Raises:
-        ArgumentError: They are not the cloud's vertices, or ordered already.
     """
-    if vertices.count != cloud.point_count or vertices.order is not None:
-        raise ArgumentError("vertices", vertices.count, f"the {cloud.point_count} of the cloud")
     bounds = cloud.bounds()
     count, stride = vertices.count, vertices.stride
     order = np.empty(0, np.intp)
@@ -739,9 +708,6 @@ class CloudHistory:
         decay_time_s: Seconds that clouds are shown; 0 until the next one arrives.
         max_points: Most points of all clouds.
         max_bytes: Most bytes of all clouds.
-
-    Raises:
-        ArgumentError: A number is negative or not finite.
     """
 
     def __init__(
@@ -750,8 +716,6 @@ class CloudHistory:
         max_points: int = _MAX_KEPT_POINTS,
         max_bytes: int = _MAX_KEPT_BYTES,
     ) -> None:
-        for name, limit in (("max_points", max_points), ("max_bytes", max_bytes)):
-            _check_not_negative(name, limit)
         self._max_points, self._max_bytes = max_points, max_bytes
         self._entries: deque[CloudEntry] = deque()
         self._points = self._bytes = 0
@@ -765,8 +729,7 @@ class CloudHistory:
 
     @decay_time_s.setter
     def decay_time_s(self, seconds: float) -> None:
-        _check_not_negative("decay_time_s", seconds)
-        self._decay_time_s = float(seconds)
+        self._decay_time_s = seconds
         self.warning = ""
 
     @property
@@ -780,7 +743,11 @@ class CloudHistory:
         return self._points
 
     def add(
-        self, cloud: Cloud, transform: Any, received_s: float, stamp: Time | None = None
+        self,
+        cloud: Cloud,
+        transform: NDArray[np.float64],
+        received_s: float,
+        stamp: Time | None = None,
     ) -> tuple[CloudEntry, list[CloudEntry]]:
         """Add a cloud, and remove those that it replaces.
 
@@ -792,12 +759,8 @@ class CloudHistory:
 
         Returns:
             The new entry, and those removed.
-
-        Raises:
-            ArgumentError: The transform or the time is invalid.
         """
-        check_finite("received_s", received_s)
-        entry = CloudEntry(cloud, to_matrix(transform), float(received_s), stamp)
+        entry = CloudEntry(cloud, transform, received_s, stamp)
         removed = self.expire(received_s) if self._decay_time_s else self.clear()
         self._entries.append(entry)
         self._points += cloud.point_count
@@ -838,38 +801,3 @@ class CloudHistory:
         self._points -= entry.cloud.point_count
         self._bytes -= entry.cloud.data.nbytes
         return entry
-
-
-def _check_not_negative(name: str, value: Any) -> None:
-    check_finite(name, value)
-    if value < 0:
-        raise ArgumentError(name, value, "a number from 0")
-
-
-def check_finite(name: str, value: Any) -> None:
-    """Check a number.
-
-    Raises:
-        ArgumentError: The value is not a number, NaN or infinite.
-    """
-    try:
-        valid = math.isfinite(value)
-    except (TypeError, OverflowError):
-        valid = False
-    if not valid:
-        raise ArgumentError(name, value, "a finite number")
-
-
-def to_matrix(transform: Any) -> NDArray[np.float64]:
-    """Return a transform as a 4x4 matrix.
-
-    Raises:
-        ArgumentError: It has another shape, or numbers that are not finite.
-    """
-    try:
-        matrix = np.asarray(transform, np.float64)
-    except (TypeError, ValueError):
-        matrix = np.empty(0)
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-        raise ArgumentError("transform", transform, "a 4x4 matrix of finite numbers")
-    return matrix

@@ -12,12 +12,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rosglass.errors import ArgumentError, shown
+from rosglass.errors import shown
 from rosglass.scene.data.point_clouds import (
     FLOAT32,
     Channel,
-    check_finite,
-    to_matrix,
     to_unorm,
 )
 from rosglass.scene.render.drawing import Coloring
@@ -134,9 +132,6 @@ class ColorTransformer:
         Args:
             cloud: A cloud that it supports.
             transform: Pose of the cloud in the fixed frame, 4x4; None if it is the same frame.
-
-        Raises:
-            ArgumentError: The transform is not a matrix of finite numbers.
         """
         raise NotImplementedError
 
@@ -147,15 +142,9 @@ class FlatColor(ColorTransformer):
 
     Attributes:
         color: The color; its alpha, if it has one, is not used.
-
-    Raises:
-        ArgumentError: The color is invalid.
     """
 
     color: Color = _WHITE
-
-    def __post_init__(self) -> None:
-        _check_color("color", self.color)
 
     def colors(self, cloud: Cloud, transform: Array | None = None) -> PointColors:  # noqa: ARG002
         """Return the colors of a cloud."""
@@ -230,9 +219,6 @@ class Intensity(ColorTransformer):
         autocompute_intensity_bounds: Whether minimum and maximum are those of the cloud.
         min_intensity: Minimum otherwise.
         max_intensity: Maximum otherwise.
-
-    Raises:
-        ArgumentError: A color or a bound is invalid.
     """
 
     score: ClassVar[int] = 255
@@ -245,12 +231,6 @@ class Intensity(ColorTransformer):
     autocompute_intensity_bounds: bool = True
     min_intensity: float = 0.0
     max_intensity: float = 4096.0
-
-    def __post_init__(self) -> None:
-        for name in ("min_color", "max_color"):
-            _check_color(name, getattr(self, name))
-        for name in ("min_intensity", "max_intensity"):
-            check_finite(name, getattr(self, name))
 
     def colors(self, cloud: Cloud, transform: Array | None = None) -> PointColors:  # noqa: ARG002
         """Return the colors of a cloud."""
@@ -282,9 +262,6 @@ class AxisColor(ColorTransformer):
         min_value: Minimum otherwise, in metres.
         max_value: Maximum otherwise, in metres.
         use_fixed_frame: Whether it is the fixed frame's axis, or that of the cloud's frame.
-
-    Raises:
-        ArgumentError: The axis or a bound is invalid.
     """
 
     score: ClassVar[int] = 255
@@ -295,17 +272,11 @@ class AxisColor(ColorTransformer):
     max_value: float = 10.0
     use_fixed_frame: bool = True
 
-    def __post_init__(self) -> None:
-        if self.axis not in {"X", "Y", "Z"}:
-            raise ArgumentError("axis", self.axis, "X, Y or Z")
-        check_finite("min_value", self.min_value)
-        check_finite("max_value", self.max_value)
-
     def colors(self, cloud: Cloud, transform: Array | None = None) -> PointColors:
         """Return the colors of a cloud."""
         row = np.eye(4)["XYZ".index(self.axis)]
         if self.use_fixed_frame and transform is not None:
-            row = to_matrix(transform)["XYZ".index(self.axis)]
+            row = transform["XYZ".index(self.axis)]
         axis, offset = (float(row[0]), float(row[1]), float(row[2])), float(row[3])
         low, high = self.min_value, self.max_value
         if self.autocompute_value_bounds:
@@ -360,12 +331,3 @@ def _white(problem: str, cloud: Cloud) -> PointColors:
 
 def _rgb(color: Color) -> Rgb:
     return float(color[0]), float(color[1]), float(color[2])
-
-
-def _check_color(name: str, color: Any) -> None:
-    try:
-        valid = len(color) in {3, 4} and all(0 <= float(part) <= 1 for part in color)
-    except (TypeError, ValueError):
-        valid = False
-    if not valid:
-        raise ArgumentError(name, color, "red, green, blue (and alpha) from 0 to 1")

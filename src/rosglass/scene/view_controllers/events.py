@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rosglass.errors import Error
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -122,15 +120,7 @@ class Touch(NamedTuple):
             before: x and y of each finger at the last event.
             after: The same now, of the same fingers in the same order.
             size: Width and height of the item.
-
-        Raises:
-            Error: There are none, or not the same number.
         """
-        if not before or len(before) != len(after):
-            raise Error(
-                f"a touch needs the same fingers before and after, got {len(before)} and "
-                f"{len(after)}"
-            )
         old, new = np.array(before, np.float64), np.array(after, np.float64)
         (x, y), (old_x, old_y) = new.mean(axis=0), old.mean(axis=0)
         old, new = old - (old_x, old_y), new - (x, y)
