@@ -593,7 +593,7 @@ def survey(
     exclude: str = "",
     timeout: float = 3.0,
 ) -> list[SurveyEntry]:
-    """Return what a bridge would relay, without relaying it; arguments as for :class:`Bridge`.
+    """Return the relays that a bridge with these arguments would create; see :class:`Bridge`.
 
     Waits for unknown types up to `timeout` seconds.
     """

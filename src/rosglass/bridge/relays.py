@@ -574,7 +574,7 @@ class TopicRelay:
 
 
 def topic_notes(translation: Translation) -> tuple[str, ...]:
-    """Describe what a translation of messages loses and adds."""
+    """Describe the fields that a translation of messages loses and adds."""
     found = []
     if translation.left_out:
         found.append(f"left out: {', '.join(translation.left_out)}")
@@ -702,7 +702,7 @@ class OfferedRelay(ABC, Generic[_Client, _Server, _Type, _Translation]):
 def service_notes(
     translation: ServiceTranslation | ActionTranslation, parts: tuple[str, ...]
 ) -> tuple[str, ...]:
-    """Describe what a translation of a service or action loses."""
+    """Describe the fields that a translation of a service or action loses."""
     found = []
     for name in parts:
         found += [f"left out of the {name}: {path}" for path in getattr(translation, name).left_out]

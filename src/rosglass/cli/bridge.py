@@ -164,7 +164,7 @@ def _watch(args: argparse.Namespace, bridge: Bridge, end: End, nodes: tuple[Node
 
 
 class _Reports:
-    """Prints what fails or gets lost, when that begins; and when it is over."""
+    """Prints failures and losses when they begin, and when they end."""
 
     def __init__(self, on_terminal: bool) -> None:
         self._problems = ProblemReports(_REPORT_DELAY_S, over_status=on_terminal)

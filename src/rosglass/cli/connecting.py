@@ -96,7 +96,7 @@ def connect(args: argparse.Namespace, *, wait_for_start: bool = False) -> Node:
 def create_typed(
     node: Node, create: Callable[[], _T], type_name: str | None, timeout: float | None
 ) -> _T:
-    """Return what `create` makes of a type that only the robot may have.
+    """Return the result of `create` for a type that only the robot may have.
 
     A command's node is new: it may not know yet who uses the type, and would not ask them.
 

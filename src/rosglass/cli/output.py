@@ -96,7 +96,7 @@ class ProblemReports:
         self._reported: dict[str, str] = {}
 
     def update(self, problems: Mapping[str, str], *, last: bool = False) -> None:
-        """Print what has changed.
+        """Print changes.
 
         Args:
             problems: Problems by the name of their cause.

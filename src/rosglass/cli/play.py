@@ -99,7 +99,7 @@ def _arguments(args: argparse.Namespace) -> tuple[str, dict[str, str]]:
 
 
 def _print_problems(player: Player, printed: dict[str, str], *, last: bool = False) -> None:
-    """Print what is not played, once; and at the end, which messages were skipped."""
+    """Print topics that are not played, once; and skipped messages at the end."""
     for topic, problem in list(player.problems.items()):
         if topic and printed.get(topic) != problem and (last or topic not in printed):
             printed[topic] = problem

@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def make_recorder(args: argparse.Namespace) -> WindowRecorder | None:
-    """Return what records the window as the command line says; None for nothing.
+    """Return the recorder of the window, by the command line; None without one.
 
     Raises:
         Error: The video cannot be written.

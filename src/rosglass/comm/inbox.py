@@ -638,7 +638,7 @@ class _Meter:
             self._stamps.add(sample.publisher, sample.received_ns, stamp)
 
     def lateness_ns(self, sample: Sample) -> tuple[int | None, int | None]:
-        """Do what :meth:`Inbox.lateness_ns` does."""
+        """Return the same as :meth:`Inbox.lateness_ns`."""
         publisher, received, sent = sample.publisher, sample.received_ns, sample.sent_ns
         late = None if sent is None else self._estimator.lateness(publisher, received, sent)
         stamp = header_stamp(sample.type, sample.wire, sample.data)

@@ -112,7 +112,7 @@ class VideoWriter:
         return self._queue.full()
 
     def status(self) -> VideoStatus:
-        """Return what was recorded so far."""
+        """Return the present state of the recording."""
         with self._lock:
             duration = self._last - self._first
             return VideoStatus(self._frames, self._dropped, duration, self._problem)
@@ -144,7 +144,7 @@ class VideoWriter:
             self._dropped += 1
 
     def close(self, time: float | None = None) -> VideoStatus:
-        """Write what is left, and close the file; safe to call twice.
+        """Write the waiting frames, and close the file; safe to call twice.
 
         Args:
             time: Time in seconds at which the last frame ends; None for the frame's own time.

@@ -242,19 +242,19 @@ class Knowledge:
         return Knowledge(align, 0)
 
     def repeated(self, step: Callable[[Knowledge], Knowledge]) -> Knowledge:
-        """Return what holds before and after every iteration of a loop with the body `step`."""
+        """Return the position that holds before and after every iteration of a loop over `step`."""
         known = self
         while (both := known.meet(step(known))) != known:
             known = both
         return known
 
     def meet(self, other: Knowledge) -> Knowledge:
-        """Return what holds in both cases."""
+        """Return the position that holds in both cases."""
         modulus = gcd(self.modulus, other.modulus, abs(self.residue - other.residue) or 8)
         return Knowledge(modulus, self.residue % modulus)
 
     def many(self, size: int) -> Knowledge:
-        """Return what is known after an unknown number of steps of `size` bytes."""
+        """Return the position after an unknown number of steps of `size` bytes."""
         modulus = gcd(self.modulus, size or 8)
         return Knowledge(modulus, self.residue % modulus)
 
@@ -264,17 +264,17 @@ START = Knowledge(8, 0)
 
 
 def after_text(known: Knowledge, wire: Wire, wide: bool) -> Knowledge:
-    """Return what is known of the position after a string."""
+    """Return the position after a string."""
     return known.to(4).after(4).many(wire.wide if wide else 1)
 
 
 def after_elements(known: Knowledge, align: int, step: int, size: int) -> Knowledge:
-    """Return what is known after any number of elements, without padding after the last."""
+    """Return the position after any number of elements, without padding after the last."""
     return known.meet(known.to(align).many(step).after(size))
 
 
 def after_schema(known: Knowledge, wire: Wire, schema: Schema) -> Knowledge:
-    """Return what is known of the position after a message."""
+    """Return the position after a message."""
     if not wire.aligned:
         return ANYWHERE
     after: Knowledge = schema.cached(
@@ -292,7 +292,7 @@ def _after_schema(known: Knowledge, wire: Wire, schema: Schema) -> Knowledge:
 
 
 def after_member(known: Knowledge, wire: Wire, member: Member) -> Knowledge:
-    """Return what is known of the position after a field."""
+    """Return the position after a field."""
 
     def one(known: Knowledge) -> Knowledge:
         if member.kind is Kind.TEXT:

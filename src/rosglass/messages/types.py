@@ -373,7 +373,7 @@ class MessageType:
     def decode_checked(
         self, buffer: Any, wire: str | None = None, *, wstring_width: int | None = None
     ) -> Message:
-        """Do what :meth:`validate` and :meth:`decode` do, in one pass over the bytes.
+        """Combine :meth:`validate` and :meth:`decode` in one pass over the bytes.
 
         The message's own fields are decoded; larger nested messages and arrays of messages are
         checked, and decoded when they are read.

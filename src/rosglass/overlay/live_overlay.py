@@ -117,7 +117,7 @@ class LiveOverlay(Overlay):
         raise NotImplementedError(self._missing("_close_view()"))
 
     def _standing_problem(self) -> str:
-        """Return what is wrong as long as this version of the file is shown."""
+        """Return the problem while this version of the file is shown."""
         return ""
 
     @property

@@ -63,7 +63,7 @@ class Plugin:
         self._owner.remove(self)
 
     def require(self) -> Any:
-        """Return what the 3D view has.
+        """Return the 3D view's own object.
 
         Raises:
             Error: It was removed.
@@ -131,7 +131,7 @@ class PluginList(QtCore.QObject):
         emit_rest()
 
     def _handles(self) -> Iterable[Any]:
-        """Return what the view has now."""
+        """Return the view's present objects."""
         raise NotImplementedError(f"{type(self).__name__} must implement _handles()")
 
     def _create(self, handle: Any) -> Plugin:

@@ -197,7 +197,7 @@ class SceneAccess(Access):
         QtCore.QTimer.singleShot(0, self, load)
 
     def save_config(self, file: str = "") -> None:
-        """Save what is shown as a ``.rviz`` file, by default to the file it was loaded from.
+        """Save the view as a ``.rviz`` file, by default to the file it was loaded from.
 
         Raises:
             Error: The file cannot be written, or no config is loaded and no file is given.

@@ -255,7 +255,7 @@ class Publisher(Element):
             self._reference = None
 
     def _report_held(self) -> None:
-        """Log what an interface that has ended did not send."""
+        """Log messages that an ended interface did not send."""
         if self._held and self._config is None:
             text = "the interface ended before there was a node"
             _log.error("nothing was published on %s: %s", self._topic, text)

@@ -315,7 +315,7 @@ class Ros(ValueFunctions):
 
     @Slot(result=QJSValue)
     def CommandQoS(self) -> QJSValue:
-        """Return what commands give as queue size: the newest message, sent in 0.3 s or dropped."""
+        """Return the queue size for commands: the newest message, sent in 0.3 s or dropped."""
         return self._runtime.qos(QoS.command())
 
     @Slot(QJSValue, QJSValue, QJSValue, result=QtCore.QObject)

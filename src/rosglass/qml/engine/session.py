@@ -258,7 +258,7 @@ class _GarbageCollection:
             gc.set_threshold(*self._thresholds)
 
     def _collect(self) -> None:
-        """Collect what Python would have collected by now."""
+        """Collect the garbage that Python would have collected by now."""
         if not gc.isenabled():
             return
         now, counts = time.monotonic(), gc.get_count()

@@ -129,7 +129,7 @@ def _text(value: Any) -> Any:
 
 
 def _value(setting: Setting, text: Any) -> Any:
-    """Return what the user has entered, as the setting takes it.
+    """Return the user's input as a value of the setting.
 
     Raises:
         Error: It does not fit.
@@ -231,7 +231,7 @@ class DisplaysModel(QAbstractListModel):
 
     @Slot()
     def refresh(self) -> None:
-        """Show what has changed."""
+        """Show changes."""
         if not is_alive(self) or self.frozen:
             return
         view = self._view

@@ -216,7 +216,7 @@ class ViewProgram(QtCore.QObject):
 
     @Slot(str)
     def _on_config_loaded(self, source: str) -> None:
-        """Follow what is shown: an overlay may have loaded it."""
+        """Follow a config that an overlay may have loaded."""
         assert self._view is not None
         assert self._view.config is not None
         geometry = _geometry(self._view.config)
@@ -248,7 +248,7 @@ class ViewProgram(QtCore.QObject):
         report(self, modified=False)
 
     def _state(self) -> bytes:
-        """Return what would be saved, for a look at whether it has changed."""
+        """Return the state that would be saved, to detect changes."""
         if self._view is None:
             return b""
         config = self._view.collect_config()
@@ -271,7 +271,7 @@ class ViewProgram(QtCore.QObject):
 
     @Slot(QtCore.QUrl, result=QtCore.QUrl)
     def typedFile(self, file: QtCore.QUrl) -> QtCore.QUrl:
-        """Return what the user means with a path that was typed into Qt's file dialog.
+        """Return the path that the user meant by text typed into Qt's file dialog.
 
         It joins absolute ones, and those with ``~``, to the folder that it shows.
 

@@ -69,7 +69,7 @@ class WindowRecorder(QtCore.QObject):
         return f"recording {seconds // 60}:{seconds % 60:02}"
 
     def status(self) -> VideoStatus:
-        """Return what was recorded so far."""
+        """Return the present state of the recording."""
         return self._writer.status()
 
     def start(self, window: QQuickWindow) -> None:

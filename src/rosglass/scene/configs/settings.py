@@ -114,7 +114,7 @@ class Setting(Writable[Any]):
         return self.kind.restore(saved)
 
     def saved(self, value: Any) -> Any:
-        """Return what a ``.rviz`` file keeps of a value."""
+        """Return a value in the form that ``.rviz`` files keep."""
         if self.kind.NAME == "color":
             return f"{value.red()}; {value.green()}; {value.blue()}"
         return self.kind.saved(value)

@@ -622,7 +622,7 @@ class _Resolver:
 
 
 def _check_gltf(data: bytes, name: str) -> bool:
-    """Refuse what trimesh would take without limit; return whether all parts have normals."""
+    """Refuse data that trimesh does not limit; return whether all parts have normals."""
     text = data
     if data[:4] == b"glTF":
         length = int.from_bytes(data[12:16], "little")

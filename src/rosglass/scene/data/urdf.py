@@ -533,7 +533,7 @@ class _Parser:
             return None
 
     def _check_mimics(self, joints: dict[str, Joint]) -> None:
-        """Remove what follows an unknown joint or, over others, itself."""
+        """Remove mimics of unknown joints, and of the joint itself through others."""
         for joint in list(joints.values()):
             if joint.mimic is not None and joint.mimic.joint not in joints:
                 unknown = joint.mimic.joint

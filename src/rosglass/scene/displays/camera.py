@@ -83,7 +83,7 @@ class _Lens(NamedTuple):
 
 
 def _read_lens(message: Any) -> _Lens:
-    """Return what a ``CameraInfo`` says.
+    """Return the parameters in a ``CameraInfo``.
 
     Raises:
         Error: The camera is not calibrated, or numbers are not finite.

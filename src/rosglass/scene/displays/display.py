@@ -225,7 +225,7 @@ class Display(Configurable, TopicElement):
         return ()
 
     def check_frames(self) -> None:
-        """Fade what follows frames that are not updated any more; called by the scene."""
+        """Fade parts whose frames are no longer updated; called by the scene."""
         scene, ages = self.scene, {}
         if scene is not None and self.shown:
             frames = (frame.lstrip("/") for frame in self.followed_frames())
@@ -254,7 +254,7 @@ class Display(Configurable, TopicElement):
         self.set_status("Frame", "warn", f"{more} may be somewhere else: {why}")
 
     def _fade(self) -> None:
-        """Draw what may be out of date as such."""
+        """Draw outdated parts faded."""
         self.root.alpha = OUTDATED_ALPHA if self._outdated_frames else 1.0
 
     def on_files(self, uris: Collection[str]) -> None:
@@ -291,7 +291,7 @@ class Display(Configurable, TopicElement):
         self._switched_parts.clear()
 
     def placeholder(self, path: str) -> str:  # noqa: ARG002 - for subclasses
-        """Return what an empty setting means, for panels; empty for nothing to say."""
+        """Return the meaning of an empty setting, for panels; empty without one."""
         return ""
 
     # -- status ----------------------------------------------------------------------------------
@@ -340,7 +340,7 @@ class Display(Configurable, TopicElement):
 
     @Slot()
     def _log_errors(self) -> None:
-        """Log what is wrong for a while, once: an interface in QML may show no status."""
+        """Log errors that have lasted, once: an interface in QML may show no status."""
         if self.scene is None or QtQml.QQmlEngine.contextForObject(self) is None:
             return
         if self.scene.problem:

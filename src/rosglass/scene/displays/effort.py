@@ -344,7 +344,7 @@ class EffortDisplay(HistoryDisplay):
     # -- messages --------------------------------------------------------------------------------
 
     def _on_items(self) -> None:
-        """Show what has arrived, at most 30 times per second: robots send states at 1 kHz."""
+        """Show new messages at most 30 times per second: robots send states at 1 kHz."""
         if not is_alive(self):
             return
         wait_s = self._next_at - time.monotonic()

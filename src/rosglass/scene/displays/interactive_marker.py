@@ -422,7 +422,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
         return f"sent on {topic}, but {why}" if why else ""
 
     def announce(self, text: str) -> None:
-        """Log what did not reach a server, and show it in the view that was used last."""
+        """Log feedback that did not reach a server, and show it in the last used view."""
         self._log(f"{self.label}: {text}", logging.WARNING)
         view = self.used_view or self._view
         if view is not None and is_alive(view):
@@ -573,7 +573,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
     # -- status ----------------------------------------------------------------------------------
 
     def set_line(self, name: str, problem: str) -> None:
-        """Set what is wrong with a marker; an empty text if nothing is."""
+        """Set the problem of a marker; an empty text if there is none."""
         line = f"Marker {name[:_MAX_NAME]}"
         if not problem:
             self.delete_status(line)

@@ -125,7 +125,7 @@ class Control:
     # -- drawing ---------------------------------------------------------------------------------
 
     def change(self, record: ControlRecord) -> None:
-        """Become what a changed message says; a drag goes on."""
+        """Apply a changed message; a drag continues."""
         self.record = record
         self._frames.clear()
         self.draw()
@@ -459,7 +459,7 @@ class InteractiveMarker:
         self.change(record)
 
     def change(self, record: InteractiveMarkerRecord) -> None:
-        """Become what a message says; a control that is dragged is kept."""
+        """Apply a message; a dragged control is kept."""
         self.record = record
         self.frame, self.stamp, self._placed = record.frame, record.stamp, False
         dragged = self.dragged
@@ -488,7 +488,7 @@ class InteractiveMarker:
         self.restyle()
 
     def restyle(self) -> None:
-        """Show what the display's settings say."""
+        """Apply the display's settings."""
         display = self.display
         self._axes.visible = bool(display.showAxes)
         if self.title is not None:
@@ -529,7 +529,7 @@ class InteractiveMarker:
         self.place()
 
     def face(self) -> None:
-        """Turn what faces the viewer."""
+        """Turn parts that face the viewer."""
         for control in (*self.controls.values(), self.title):
             if control is None or not control.record.markers:
                 continue

@@ -244,7 +244,7 @@ class MarkerGroup:
         return not (self._own or self._solids or self._batch_of)
 
     def flush(self) -> None:
-        """Draw what has changed since the last call."""
+        """Draw the changes since the last call."""
         for solids in self._batches.values():
             solids.flush()
         for look, batches in list(self._joint.items()):
@@ -468,7 +468,7 @@ class Markers(TopicDisplay):
         self._flush_later()
 
     def on_transforms(self) -> None:
-        """Show what has waited for transforms; move what is locked to its frame."""
+        """Show markers that waited for transforms; move the ones locked to their frame."""
         self._show_waiting()
         if self.scene is not None:
             self._follow(_Poses(self.scene))
@@ -495,7 +495,7 @@ class Markers(TopicDisplay):
             group.root.alpha = OUTDATED_ALPHA if frame in self._outdated_frames else 1.0
 
     def _follow(self, poses: _Poses, *, hide: bool = False) -> None:
-        """Place what has waited, and what is locked to its frame."""
+        """Place markers that waited, and the ones locked to their frame."""
         if self._late or self._hidden or self._lost or hide:
             self._flush_later()
         for frame in list(self._hidden):

@@ -136,7 +136,7 @@ class MarkerMeshes:
                 yield mesh
 
     def problem_of(self, marker: MarkerRecord) -> str:
-        """Return what is wrong with the file of a mesh marker, in words; empty for none."""
+        """Return the problem with the file of a mesh marker, in words; empty without one."""
         file = self._files.get(marker.resource)
         return "" if file is None else file.problem
 

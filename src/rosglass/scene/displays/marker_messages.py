@@ -304,7 +304,7 @@ def _numbers_problem(numbers: list[float]) -> str:
 
 
 def _colors_warning(kind: int, points: int, colors: NDArray[np.float32]) -> str:
-    """Return what is wrong with the colors of points; empty if nothing is."""
+    """Return the problem with the colors of points; empty without one."""
     if kind not in _COLORED:
         return ""
     if len(colors) not in ((0, points, points // 3) if kind == TRIANGLE_LIST else (0, points)):

@@ -321,7 +321,7 @@ def _halved(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _once(known: dict[Any, _T | Exception], key: Any, read: Callable[[], _T]) -> _T:
-    """Return what was read under a key, or raise why it could not be, as the first time."""
+    """Return the value read under a key, or raise the error of the first attempt."""
     if key not in known:
         try:
             known[key] = read()
@@ -339,7 +339,7 @@ def _shape_of(part: MeshPart, scale: tuple[float, float, float]) -> Shape:
 
 
 def link_drawables(visual: Visual, problems: dict[str, str], files: MeshFiles) -> list[Mesh]:
-    """Return what a visual or collision of a link draws, in the link's frame.
+    """Return the drawables of a link's visual or collision, in the link's frame.
 
     Reads mesh files: not for the GUI thread.
 

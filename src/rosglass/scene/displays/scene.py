@@ -600,7 +600,7 @@ class Scene(Element):
 
     @Slot()
     def _begin_anew(self) -> None:
-        """Drop what displays have received; after a jump, tf's listener clears the transforms."""
+        """Drop received messages of displays; after a jump, tf's listener clears the transforms."""
 
         def restart(display: Display) -> None:
             display._close_endpoint()

@@ -174,7 +174,7 @@ class TopicDisplay(Display):
         self._schedule()  # one that shows each receives more
 
     def profile(self) -> QoS:
-        """Return what is requested of publishers."""
+        """Return the QoS to request."""
         return QoS(
             depth=MOST_WAITING if self.shows_all() else self.depth,
             reliability=_RELIABILITY[self.reliability],
@@ -358,7 +358,7 @@ class TopicDisplay(Display):
         self._drop_oldest(queue)
 
     def _drop_oldest(self, queue: MessageQueue) -> None:
-        """Drop what waits beside newer messages, and say so if it is missed."""
+        """Drop messages that wait beside newer ones, and report it if that matters."""
         most, before = self.most_waiting(), len(self._waiting)
         count = drop_oldest(self._waiting, most, size_of)
         if self._is_loss() or (self.shows_all() and before <= most):
@@ -373,7 +373,7 @@ class TopicDisplay(Display):
             self.set_status("Dropped messages", "warn", "; ".join(dropped))
 
     def _show_waiting(self) -> None:
-        """Show what waits for its transform, as far as it is known now."""
+        """Show waiting messages whose transforms are known now."""
         if not self.shows_all():
             # The newest that can be placed; older ones are of no use then.
             for at in range(len(self._waiting) - 1, -1, -1):
@@ -436,7 +436,7 @@ class TopicDisplay(Display):
         raise NotImplementedError
 
     def on_transforms(self) -> None:
-        """Show what has waited for transforms, and what another fixed frame has hidden."""
+        """Show messages that waited for transforms or were hidden by another fixed frame."""
         if self.enabled and not self.root.visible:
             self._place_last()
         if self._waiting:

@@ -96,7 +96,7 @@ class ViewControl(QtCore.QObject):
                 self._end.start()
 
     def take_settings(self, display: ViewControllerDisplay) -> None:
-        """Set what the user, or QML, has set in a display."""
+        """Apply the settings that the user, or QML, has changed in a display."""
         if not self._shows:
             for name, setting in _SETTINGS.items():
                 setting.of(self.view.settings).set(display.get(name))

@@ -174,7 +174,7 @@ class Points(Drawable):
         coloring: Coloring | None = None,
         alpha: float | None = None,
     ) -> None:
-        """Change what is given.
+        """Change the given properties.
 
         Raises:
             Error: The style is unknown.

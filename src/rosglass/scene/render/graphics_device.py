@@ -220,13 +220,13 @@ class GraphicsDevice:
                 self.images.pop(id(image.pixels), None)
 
     def white_texture(self, batch: QRhiResourceUpdateBatch) -> QRhiTexture:
-        """Return what is bound where there is no image."""
+        """Return the texture that stands for a missing image."""
         if self.white is None:
             self.white = self.texture(batch, np.full((1, 1, 4), 255, np.uint8), None)
         return self.white
 
     def bindings(self, block: QRhiBuffer, *images: tuple[QRhiTexture, QRhiSampler]) -> Any:
-        """Return what a drawable's shaders read: the frame's block, its own, its images."""
+        """Return the resources of a drawable's shaders: the frame's block, its own, its images."""
         binding = QRhiShaderResourceBinding
         made = self.rhi.newShaderResourceBindings()
         made.setBindings(

@@ -136,7 +136,7 @@ class _OnDevice:
         place: NDArray[np.float64],
         alpha: float,
     ) -> None:
-        """Upload what has changed."""
+        """Upload changes."""
         drawable = self.drawable
         if self._geometry != drawable.geometry:
             self.upload(batch)
@@ -679,7 +679,7 @@ class SceneRenderer(QQuickRhiItemRenderer):
     def _prepare(
         self, device: GraphicsDevice, frame: Frame, batch: QRhiResourceUpdateBatch
     ) -> tuple[list[tuple[_Drawn, bool]], str]:
-        """Upload what has changed; return what to draw in which order, and what cannot be drawn."""
+        """Upload changes; return the drawables in their order, and the problems of others."""
         eye = np.array(frame.camera.eye)
         if np.abs(eye - self._origin).max() > _ORIGIN_STEP_M:
             self._origin = np.round(eye)

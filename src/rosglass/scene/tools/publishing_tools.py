@@ -220,7 +220,7 @@ class PublishingTool(Tool):
         return similar(sender.topic, names)
 
     def drop_waiting(self) -> bool:
-        """Drop what waits for a subscriber or a server; return whether there was something."""
+        """Drop a message that waits for a subscriber or a server; return whether there was one."""
         waiting, self._waiting = self._waiting, None
         if waiting is not None:
             self.announce(f"{waiting[1]}: not sent, for it was dropped")
@@ -252,7 +252,7 @@ class PublishingTool(Tool):
 
 
 def _warn_of_goals(state: dict[str, Any], *_: Any) -> None:
-    """Log what a tool that QML has destroyed leaves behind; only its attributes are left."""
+    """Log unsent messages and goals of a destroyed tool; only its attributes are left."""
     waiting = state.get("_waiting")
     if waiting is not None:
         _log.warning("%s: not sent: the tool was destroyed", waiting[1])

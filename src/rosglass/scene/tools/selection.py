@@ -119,7 +119,7 @@ class Selection(QtCore.QObject):
     # -- changing it -----------------------------------------------------------------------------
 
     def select_at(self, x: float, y: float, change: Change = "replace") -> None:
-        """Select what is in front under a point of the view.
+        """Select the foremost part under a point of the view.
 
         Args:
             x: Units of the view, from its left edge.
@@ -133,7 +133,7 @@ class Selection(QtCore.QObject):
     def select_between(
         self, corner: tuple[float, float], opposite: tuple[float, float], change: Change = "replace"
     ) -> None:
-        """Select what is in a rectangle of the view, hidden or not.
+        """Select the parts in a rectangle of the view, hidden or not.
 
         Args:
             corner: x and y, units of the view.
@@ -172,7 +172,7 @@ class Selection(QtCore.QObject):
     # -- reading it ------------------------------------------------------------------------------
 
     def items(self) -> list[SelectedPart]:
-        """Return what is selected, at most 200 parts."""
+        """Return the selected parts, at most 200."""
         poses = {drawable: pose for drawable, pose, _ in self._drawables()}
         found: list[SelectedPart] = []
         wholes: set[int] = set()
@@ -245,13 +245,13 @@ class Selection(QtCore.QObject):
 
     @Slot()
     def on_scene(self) -> None:
-        """Follow what has changed, a little later; called by the view."""
+        """Follow changes, a little later; called by the view."""
         if self._marked and not self._timer.isActive():
             self._timer.start(_FOLLOW_MS)
 
     @Slot()
     def _follow(self) -> None:
-        """Drop what is gone, and move the boxes with the rest."""
+        """Drop parts that no longer exist, and move the boxes with the rest."""
         if not is_alive(self):
             return
         before = len(self)
@@ -326,7 +326,7 @@ def _owner_names(drawable: Drawable, index: int) -> tuple[str, str]:
 
 
 def _find_description(drawable: Drawable) -> tuple[Any, bool]:
-    """Return what describes a drawable's parts, None for nothing; and whether by their numbers."""
+    """Return the describer of a drawable's parts, or None; and whether it takes their indices."""
     owner = drawable.owner
     # The describe() of a display itself lists its settings.
     describe = None if isinstance(owner, Configurable) else getattr(owner, "describe", None)

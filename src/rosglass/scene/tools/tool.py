@@ -205,7 +205,7 @@ class Tool(Configurable, Element):
         """Handle the release of the button whose press it has taken."""
 
     def on_cancel(self) -> None:
-        """Drop what was begun by a press, as for Escape, a second finger or another fixed frame."""
+        """Cancel a press, as for Escape, a second finger or another fixed frame."""
 
     def on_fixed_frame(self) -> None:
         """Drop points of the fixed frame before."""
@@ -227,11 +227,11 @@ class Tool(Configurable, Element):
         return False
 
     def drop_waiting(self) -> bool:
-        """Drop what still waits to be sent (Escape); return whether there was something."""
+        """Drop a waiting message (Escape); return whether there was one."""
         return False
 
     def set_status(self, text: str, *, hit: bool | None = None) -> None:
-        """Show what to do now, and whether there is something under the mouse for it.
+        """Show the instructions, and whether there is a target under the mouse.
 
         Args:
             text: For the status bar.

@@ -94,7 +94,7 @@ class Tools(QtCore.QObject):
 
     @Slot(str, result=str)
     def nameOf(self, kind: str) -> str:
-        """Return what the button of a type of tools says; the type for one that does not exist."""
+        """Return the button's text for a type of tools; the type itself if it does not exist."""
         return self.TYPES[kind].NAME if kind in self.TYPES else kind
 
     @Slot(str, result=str)
@@ -456,7 +456,7 @@ class Tools(QtCore.QObject):
         return self._view.move_camera(lambda view: view.on_key(key, point))
 
     def on_escape(self) -> bool:
-        """Cancel what was begun, or return to the default tool; return whether it was used."""
+        """Cancel the present action, or return to the default tool; return whether it was used."""
         if self._grab == "tool":
             self._cancel()
             return True
@@ -485,7 +485,7 @@ class Tools(QtCore.QObject):
             self._call(one, one.on_fixed_frame)
 
     def cancel(self) -> None:
-        """Drop what was begun by a press."""
+        """Cancel a press."""
         self._cancel()
         self._grab = ""
 

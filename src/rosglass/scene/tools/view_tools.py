@@ -66,7 +66,7 @@ class MoveCameraTool(Tool):
         return camera_cursor(event)
 
     def help(self, modifiers: Modifier) -> str:
-        """Return what the mouse does to the camera."""
+        """Return the instructions for the camera."""
         return "" if self.view is None else self.view.controller.help(modifiers)
 
 
@@ -108,7 +108,7 @@ class InteractTool(MoveCameraTool):
             self.set_status("" if found is None else found.help)
 
     def help(self, modifiers: Modifier) -> str:
-        """Return what the mouse does to what is under it, or to the camera."""
+        """Return the instructions for the object under the mouse, or for the camera."""
         return self.statusText or super().help(modifiers)
 
     def on_press(self, event: PointerEvent) -> bool:
@@ -117,7 +117,7 @@ class InteractTool(MoveCameraTool):
         return self._focused is not None and self._focused.handle_pointer("press", event)
 
     def on_move(self, event: PointerEvent) -> None:
-        """Find what is under the mouse, or drag."""
+        """Find the object under the mouse, or drag."""
         if not event.buttons:
             self._focus(event)
         if self._focused is not None:
@@ -140,11 +140,11 @@ class InteractTool(MoveCameraTool):
             focused.handle_pointer("cancel", PointerEvent(self.view, (0.0, 0.0)))
 
     def deactivate(self) -> None:
-        """Leave what was under the mouse."""
+        """Leave the object that was under the mouse."""
         self.on_leave()
 
     def on_leave(self) -> None:
-        """Leave what was under the mouse."""
+        """Leave the object that was under the mouse."""
         focused, self._focused = self._focused, None
         self.set_status("")
         if focused is not None and self.view is not None:
@@ -282,7 +282,7 @@ class MeasureTool(Tool):
 
 
 class SelectTool(Tool):
-    """Selects what is in a rectangle, or under a click; ``view.selection`` lists it."""
+    """Selects parts in a rectangle, or under a click; ``view.selection`` lists them."""
 
     TYPE, NAME, KEY = "Select", "Select", "s"
     DESCRIPTION = "Selects what is in a rectangle. Shift adds, Ctrl removes, Alt moves the camera."
@@ -336,7 +336,7 @@ class SelectTool(Tool):
         rectangle.setVisible(True)
 
     def on_release(self, event: PointerEvent) -> None:
-        """Select what is in the rectangle."""
+        """Select the parts in the rectangle."""
         corner, view = self._corner, self.view
         self.on_cancel()
         if corner is None or view is None:

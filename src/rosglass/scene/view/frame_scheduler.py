@@ -68,7 +68,7 @@ class FrameScheduler(QtCore.QObject):
     def create_renderer(
         self, take_frame: Callable[[], Frame], on_problem: Callable[[str], None]
     ) -> SceneRenderer:
-        """Return what draws; called in the render thread.
+        """Return a new renderer; called in the render thread.
 
         Args:
             take_frame: Returns what is drawn.
@@ -185,14 +185,14 @@ class FrameScheduler(QtCore.QObject):
 
     @Slot()
     def _free_devices(self) -> None:
-        """Free what is on the device before the window, which has it, is gone."""
+        """Release resources of the graphics device before its window is destroyed."""
         if self._drawing is not None:
             for renderer in self.renderers:
                 renderer.close()
 
 
 def close_renderers(renderers: list[SceneRenderer]) -> None:
-    """Free what the renderers of a view have on the device, once the view is destroyed."""
+    """Release the renderers' resources on the device, once the view is destroyed."""
     kept = list(renderers)
     for renderer in kept:
         # C++ has deleted it before or does so a little later, with the scene graph; what Python has

@@ -101,7 +101,7 @@ class PointerInput(QtCore.QObject):
             self._view.show_focal_shape()
 
     def hover(self, event: Any) -> None:
-        """Show what is under the mouse."""
+        """Show the object under the mouse."""
         self._is_hovered = True
         self._tools.on_move(self._event_at(event.position(), event))
 
@@ -118,7 +118,7 @@ class PointerInput(QtCore.QObject):
 
     @Slot()
     def _hover_again(self) -> None:
-        """Show what is under the mouse, which has stayed where it is."""
+        """Show the object under the resting mouse."""
         if self._is_hovered and not self._tools.holds_mouse:
             modifiers = Modifier(QGuiApplication.keyboardModifiers().value & _MODIFIERS)
             at = (self._pointed.x(), self._pointed.y())
@@ -178,7 +178,7 @@ class PointerInput(QtCore.QObject):
             )
 
     def ungrab_touch(self) -> None:
-        """Drop what another item has taken over."""
+        """Cancel a drag that another item has taken over."""
         if is_alive(self._view):
             self._fingers, self._finger_is_button = {}, False
             self._tools.cancel()

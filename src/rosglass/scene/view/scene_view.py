@@ -531,7 +531,7 @@ class SceneView(QQuickRhiItem):
     # -- config files ----------------------------------------------------------------------------
 
     def load_config(self, path: str | os.PathLike[str]) -> list[str]:
-        """Replace what is shown by an RViz config (``.rviz``).
+        """Replace the content by an RViz config (``.rviz``).
 
         Returns:
             What was left out, a line each.
@@ -542,7 +542,7 @@ class SceneView(QQuickRhiItem):
         return self.show_config(RvizConfig.load(path))
 
     def show_config(self, config: RvizConfig) -> list[str]:
-        """Replace what is shown by a config; return what was left out, a line each."""
+        """Replace the content by a config; return the parts left out, a line each."""
         self.configLoading.emit()
         notes = show_displays(self.scene, config)
         red, green, blue, _ = config.background_color
@@ -583,7 +583,7 @@ class SceneView(QQuickRhiItem):
         return config
 
     def save_config(self, path: str | os.PathLike[str] = "") -> None:
-        """Write what is shown into an RViz config.
+        """Write the content into an RViz config.
 
         Args:
             path: The file; by default the one that was loaded.
@@ -685,7 +685,7 @@ class SceneView(QQuickRhiItem):
         return self._turn is not None
 
     def pick(self, x: float, y: float, radius: float = 2.0) -> Hit | None:
-        """Return what is nearest to the camera at a place; None for nothing.
+        """Return the hit nearest to the camera at a point; None for nothing.
 
         Args:
             x: Units of this item, from its left edge.
@@ -707,7 +707,7 @@ class SceneView(QQuickRhiItem):
     # -- drawing ---------------------------------------------------------------------------------
 
     def createRenderer(self) -> SceneRenderer:
-        """Return what draws; called by Qt in the render thread."""
+        """Return a new renderer; called by Qt in the render thread."""
         return self._frames.create_renderer(self._take_frame, self._on_problem)
 
     def _take_frame(self) -> Frame:
@@ -759,11 +759,11 @@ class SceneView(QQuickRhiItem):
             self._input.ungrab()
 
     def hoverEnterEvent(self, event: Any) -> None:
-        """Show what is under the mouse, which may not move again."""
+        """Show the object under the mouse, which may not move again."""
         self._input.hover(event)
 
     def hoverMoveEvent(self, event: Any) -> None:
-        """Show what is under the mouse."""
+        """Show the object under the mouse."""
         self._input.hover(event)
 
     def hoverLeaveEvent(self, event: Any) -> None:
@@ -781,7 +781,7 @@ class SceneView(QQuickRhiItem):
         self._input.touch(event)
 
     def touchUngrabEvent(self) -> None:
-        """Drop what another item has taken over."""
+        """Cancel a drag that another item has taken over."""
         if is_alive(self):
             self._input.ungrab_touch()
 
@@ -794,7 +794,7 @@ class SceneView(QQuickRhiItem):
         self._input.release_key(event)
 
     def show_focal_shape(self) -> None:
-        """Show what the camera turns around, while it is dragged."""
+        """Show the point that the camera turns around, while it is dragged."""
         shape = self._view.focal_shape() if self._tools.moves_camera else None
         if shape is not None:
             self._focal.pose = shape.pose

@@ -255,11 +255,11 @@ class ViewController:
         )
 
     def focal_shape(self) -> FocalShape | None:
-        """Return what to show while a button is held, if anything."""
+        """Return the shape to show while a button is held, if any."""
         return None
 
     def action(self, buttons: Button, modifiers: Modifier) -> Action:
-        """Return what a drag would do, which also is the mouse's cursor."""
+        """Return the effect of a drag, which is also the mouse's cursor."""
         shift = bool(modifiers & Modifier.SHIFT)
         if buttons & Button.LEFT:
             return self._LEFT[shift]
@@ -268,7 +268,7 @@ class ViewController:
         return (self._RIGHT if buttons & Button.RIGHT else self._LEFT)[shift]
 
     def help(self, modifiers: Modifier) -> str:
-        """Return what the mouse does, for the status bar; bold as in HTML."""
+        """Return the instructions for the status bar; bold as in HTML."""
         return self._HELP[bool(modifiers & Modifier.SHIFT)]
 
     # Events
@@ -374,7 +374,7 @@ class ViewController:
         """Look at a point of the target frame."""
 
     def _take_over(self, other: ViewController, pose: Matrix) -> None:
-        """Show what another view shows, from its camera's pose in the target frame."""
+        """Show the same as another view, by its camera's pose in the target frame."""
 
     def _rotate(self, drag: Drag) -> None: ...
 

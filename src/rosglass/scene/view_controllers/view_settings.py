@@ -78,7 +78,7 @@ class ViewSetting(Generic[_T]):
         return value
 
     def options(self) -> dict[str, Any]:
-        """Return what narrows the values, for the panel."""
+        """Return the limits of the values, for the panel."""
         return {}
 
 

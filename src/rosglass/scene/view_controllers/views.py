@@ -391,11 +391,11 @@ class FrameAlignedView(FPSView):
         self.reset()
 
     def action(self, buttons: Button, modifiers: Modifier) -> Action:
-        """Return what a drag would do; nothing if the camera is locked."""
+        """Return the effect of a drag; nothing if the camera is locked."""
         return Action.NONE if self.lock_camera else super().action(buttons, modifiers)
 
     def help(self, modifiers: Modifier) -> str:
-        """Return what the mouse does, for the status bar."""
+        """Return the instructions for the status bar."""
         if self.lock_camera:
             return "Unlock camera in settings to enable mouse interaction."
         return super().help(modifiers)

@@ -485,7 +485,7 @@ def fragment_size(options: DdsOptions) -> int:
 
 
 def large_sample_advice(options: DdsOptions) -> str:
-    """Return what to do for large samples to Fast DDS; empty if datagrams are large already."""
+    """Return advice for large samples to Fast DDS; empty if datagrams are large already."""
     if _has_own_size(options) or _datagram_size_of(options) >= _MAX_DATAGRAM:
         return ""
     own = (

@@ -118,7 +118,7 @@ class FlowControl:
         return True
 
     def advance(self) -> bool:
-        """Send what may be sent; return whether to call this again soon."""
+        """Send the samples that may be sent; return whether to call this again soon."""
         needed = not (self._waiting or self._stalled) or self._is_needed()
         while self._waiting and (not needed or self._may_send(self._waiting[0][1])):
             serdata, size = self._waiting.popleft()
@@ -139,7 +139,7 @@ class FlowControl:
         return False
 
     def close(self) -> None:
-        """Drop what still waits."""
+        """Drop waiting samples."""
         self._stalled = False
         while self._waiting:
             discard(self._waiting.popleft()[0])

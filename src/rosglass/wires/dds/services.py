@@ -560,7 +560,7 @@ class DdsReplier(Replier):
         return True
 
     def _on_matched(self) -> None:
-        """Update what depends on the matched clients."""
+        """Update the state that depends on the matched clients."""
         self._matched_clients = set()
         if len(self._newest) > _MAX_REMEMBERED:
             here = self._endpoints.writers.by_guid

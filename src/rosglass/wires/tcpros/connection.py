@@ -310,7 +310,7 @@ class Outgoing:
 
 
 def _after(parts: Sequence[memoryview], sent: int) -> list[memoryview]:
-    """Return what follows the first `sent` bytes of `parts`."""
+    """Return the rest of `parts` after the first `sent` bytes."""
     rest = []
     for part in parts:
         if sent >= len(part):

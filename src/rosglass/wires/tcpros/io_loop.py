@@ -36,7 +36,7 @@ class Ready(Protocol):
     """The handler of a socket; called in the loop's thread, and must not block."""
 
     def ready(self, events: int) -> None:
-        """Handle what the socket is ready for: READ, WRITE or both."""
+        """Handle the readiness of the socket: READ, WRITE or both."""
 
     def end(self, reason: str) -> None:
         """Close the socket: the loop ends, or :meth:`ready` raised."""

@@ -164,7 +164,7 @@ class _Probe:
         return answer[2] & _MESSAGE if len(answer) > 2 else 0
 
     def _explain(self, answer: bytes) -> _Refusal | None:
-        """Return what the answer to a session without user means for this one."""
+        """Return the meaning for this session of the answer to one without a user."""
         message = self._message(answer)
         if message == _CLOSE:
             if not self._user:
