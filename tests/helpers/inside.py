@@ -94,11 +94,3 @@ def has_seen_the_loop(watchdog: Any) -> bool:
 def runtime_of(scene: Any) -> Any:
     """Return the runtime that the elements of a scene are made with."""
     return scene._find_runtime()
-
-
-def ask_again_after(scene: Any, seconds: float | None = None) -> float:
-    """Return after how long a robot is asked again for a file; set it to `seconds`."""
-    if seconds is not None:
-        scene._ask_again_s = seconds
-    delay: float = scene._ask_again_s
-    return delay

@@ -82,8 +82,9 @@ def test_the_view_is_read_once_per_frame(
 ) -> None:
     wait.frames(9)
     reads, frames = [], []
-    read = steered._current.read
-    monkeypatch.setattr(steered._current, "read", lambda: reads.append(1) or read())
+    view = steered._current
+    read = view.read
+    monkeypatch.setattr(view, "read", lambda: reads.append(1) or read())
     app.window.before_frame.connect(lambda: frames.append(1))
     wait(lambda: len(frames) >= 5)
     assert len(reads) <= len(frames) + 1

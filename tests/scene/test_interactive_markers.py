@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from inside import ask_again_after, endpoint_of
+from inside import endpoint_of
 from rosmaster import RosMaster
 from rospy_markers import INSTALLED, RospyServer
 from scene_mouse import Hand, has_color
@@ -822,7 +822,7 @@ def test_a_mesh_that_was_missing_is_read_again(
         assert display.status_lines["Mesh"].text == f"{uri}: the server answers 404 Not Found"
         # Reset reads everything that is missing, and a server that is down is asked again.
         web.files["/flat.obj"] = lambda request: request.send_error(503)
-        ask_again_after(bench.view.scene, 0.1)
+        bench.view.scene.ask_again_s = 0.1
         bench.view.reset()
         bench.wait(lambda: "503" in display.statusText)
         assert drawn(display) == []

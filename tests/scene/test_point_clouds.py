@@ -360,12 +360,11 @@ def test_a_picked_point_has_all_fields(bench: SceneBench, show: Callable[..., Sh
     display = shown.send(cloud(rows, "intensity"))
     x, y = rows[321][:2]
     hit = bench.view.pick(CENTER[1] + x * PIXELS_PER_M, CENTER[0] - y * PIXELS_PER_M, 0.0)
-    (shown_cloud,) = display._shown.values()
-    assert shown_cloud._data.vertices.order is not None, "picks are to be mapped back"
     # Squares of one metre overlap: the nearest of those at the same height is any of them.
     assert hit is not None
     described = dict(hit.drawable.owner.describe(hit.number))
     point = int(described["Point"])
+    assert point != hit.number, "points are drawn in another order"
     assert described["3: intensity"] == str(point)
     assert described["Position in map"] == "; ".join(
         f"{float(np.float32(value)):.6g}" for value in rows[point][:3]

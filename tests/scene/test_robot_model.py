@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from inside import ask_again_after
 
 from rosglass.scene.render.mesh_shapes import BOX, CYLINDER, SPHERE
 
@@ -313,7 +312,7 @@ def test_a_web_server_that_was_down_is_asked_again(
     with WebServer() as web:
         web.files["/arm.stl"] = web.files["/hand.stl"] = lambda request: request.send_error(503)
         view = bench.load("RobotModelDisplay {}")
-        ask_again_after(view.scene, 0.1)
+        view.scene.ask_again_s = 0.1
         (robot,) = view.scene.displays
         publish(bench, with_meshes(f"{web.url}/arm.stl", f"{web.url}/hand.stl"))
         send = send_transforms(bench, "base_link")
@@ -325,12 +324,12 @@ def test_a_web_server_that_was_down_is_asked_again(
             "later, by Reset at once"
         )
         # Less and less often, and for one file only.
-        assert ask_again_after(view.scene) >= 0.4
+        assert view.scene.ask_again_s >= 0.4
         assert [path for path, _ in web.requests].count("/hand.stl") == 1
         web.files["/arm.stl"] = web.files["/hand.stl"] = STL
         bench.wait(lambda: len(list(robot.root.drawables())) == 2)
         bench.wait(lambda: robot.statusLevel == "ok", lambda: robot.statusText)
-        assert ask_again_after(view.scene) == 0.1
+        assert view.scene.ask_again_s == 0.1
         # One that is hidden is loaded once it is shown.
         web.files["/foot.stl"] = lambda request: request.send_error(503)
         publish(bench, with_meshes(f"{web.url}/foot.stl"))

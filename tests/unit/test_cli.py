@@ -44,10 +44,15 @@ def test_each_command_has_help(command: str, capsys: pytest.CaptureFixture[str])
     assert f"usage: rosglass {command}" in capsys.readouterr().out
 
 
-def subparsers_of(parser: Any) -> dict[str, Any]:
+def actions_of(parser: argparse.ArgumentParser) -> list[argparse.Action]:
+    """Return the arguments of a parser; argparse has no public way to them."""
+    return parser._actions
+
+
+def subparsers_of(parser: argparse.ArgumentParser) -> dict[str, Any]:
     """Return the parsers of a parser's subcommands by name; none without any."""
-    group = parser._subparsers
-    return {} if group is None else group._group_actions[0].choices
+    found = [one.choices for one in actions_of(parser) if isinstance(one.choices, dict)]
+    return found[0] if found else {}
 
 
 def test_each_subcommand_has_a_function_in_the_module_of_its_command() -> None:
@@ -98,7 +103,7 @@ PLAIN = {"completion"}
 @pytest.mark.parametrize("command", sorted(leaves()))
 def test_every_argument_is_described_and_every_command_has_an_example(command: str) -> None:
     parser = leaves()[command]
-    for action in parser._actions:
+    for action in actions_of(parser):
         assert action.help, f"rosglass {command}: {action.dest}"
     if command in PLAIN:
         return

@@ -9,7 +9,7 @@ from waiting import eventually, nothing_happens
 
 import rosglass
 from rosglass import Library, ServiceError
-from rosglass.bridge import survey
+from rosglass.bridge import Bridge, survey
 from rosglass.comm import Durability, QoS
 from rosglass.messages import MessageType
 from rosglass.wires.zenoh.router import Router
@@ -451,9 +451,10 @@ def test_closing(bridge, connect):
     made.close()
     made.close()
     eventually(lambda: not one.service_servers("/closing/go"))
-    other = bridge(["*"], ["*"])
-    for side in other._sides:
-        side.node.close()
+    nodes = connect("ros1", "last_bridge"), connect("ros2", "last_bridge")
+    other = Bridge(*nodes, ["*"], ["*"])
+    for node in nodes:
+        node.close()
     other.close()
 
 

@@ -70,13 +70,13 @@ def test_all_types_of_a_topic_are_recorded(join: Callable[..., Node], tmp_path: 
         switches = robot.create_publisher("/mixed", "std_msgs/msg/Bool")
         eventually(lambda: switches.subscription_count() > 1 or len(ears.topics()["/mixed"]) > 1)
 
-        def both() -> bool:
-            texts.publish(data="y")
-            switches.publish(data=True)
-            with recorder._lock:
-                return len(recorder._channels) == 2
+        before = recorder.status().messages
 
-        eventually(both)
+        def is_recorded() -> bool:
+            switches.publish(data=True)
+            return recorder.status().messages > before
+
+        eventually(is_recorded)
         assert recorder.status().problems == {}
     with open_bag(path) as bag:
         assert [channel.type_name for channel in bag.channels] == ["std_msgs/msg/Bool", STRING]

@@ -181,7 +181,7 @@ def test_a_worker_rests_after_a_run_and_still_ends_at_once(monkeypatch):
         runs.append(regular)
         ran.set()
 
-    worker = Worker("worker", run, 3600.0)
+    worker = Worker("worker that ends", run, 3600.0)
     worker.wake()
     assert ran.wait(30)
     for _ in range(3):
@@ -189,4 +189,4 @@ def test_a_worker_rests_after_a_run_and_still_ends_at_once(monkeypatch):
         nothing_happens(0.05)
     worker.close()
     assert runs == [False]
-    assert not worker._thread.is_alive()
+    assert "worker that ends" not in {thread.name for thread in threading.enumerate()}

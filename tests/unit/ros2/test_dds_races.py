@@ -201,7 +201,7 @@ def test_a_request_that_comes_again_is_carried_out_once(server, eventually):
 def test_recorded_origins_are_dropped_with_their_reader():
     one, two = Origins(), Origins()
     one.follow(0x1000)
-    one._recorded[0x2000] = ELSEWHERE
+    one.recorded[0x2000] = ELSEWHERE
     # Another reader's type, where the first one's was.
     two.follow(0x1000)
     one.close()

@@ -70,8 +70,12 @@ def test_samples_without_identity_are_never_repeats(sample):
 
 def test_memory_is_bounded():
     repeats = DuplicateFilter()
+    publishers = [number.to_bytes(16, "big") for number in range(5000)]
+    for publisher in publishers:
+        repeats.is_duplicate(publisher, 1, 1)
+    assert repeats.is_duplicate(publishers[-1], 1, 1)
+    assert not repeats.is_duplicate(publishers[0], 1, 1), "it is forgotten"
     for number in range(5000):
-        repeats.is_duplicate(number.to_bytes(16, "big"), 1, 1)
         repeats.is_duplicate(A, number * 100, number)
-    assert len(repeats._last) <= 1025
-    assert sum(map(len, repeats._missing.values())) <= 200
+    assert not repeats.is_duplicate(A, 499_899, 0), "it was missing"
+    assert repeats.is_duplicate(A, 150, 0), "that it was missing is forgotten"

@@ -316,17 +316,22 @@ def test_server_only_ends_a_call_without_server_and_no_other(
     eventually(lambda: client.pending == 0)
 
 
+def follow(client) -> None:
+    """Let a client look at what a discovered server has changed."""
+    client._follow(True, False)
+
+
 def test_server_only_keeps_waiting_while_a_server_is_away_for_a_moment(client, requester):
     requester.linked = True
     sent = client.call_async(timeout=0.0, server_only=True)
-    client._follow(True, False)
+    follow(client)
     requester.linked = False  # as a restarted router hides all nodes
     waiting = client.call_async(timeout=0.0, server_only=True)
-    client._follow(True, False)
+    follow(client)
     assert not sent.done()
     assert not waiting.done()
     requester.linked = True
-    client._follow(True, False)
+    follow(client)
     assert len(requester.sent) == 2
 
 

@@ -370,7 +370,7 @@ def test_mimics_over_several_joints_and_in_loops() -> None:
     body += joint("b", "c", '<mimic joint="d_joint" offset="1"/>', type="continuous")
     body += joint("c", "d", type="continuous") + joint("d", "e", type="continuous")
     found = robot(body)
-    assert found._positions({"d_joint": 0.5}) == {
+    assert found.positions({"d_joint": 0.5}) == {
         "b_joint": 3.0,
         "c_joint": 1.5,
         "d_joint": 0.5,

@@ -243,13 +243,21 @@ class Robot:
         Raises:
             ArgumentError: A position is not a finite number.
         """
-        positions = self._positions(joint_positions or {})
+        positions = self.positions(joint_positions or {})
         poses = {self.root: np.eye(4)}
         for joint in self.tree:
             poses[joint.child] = poses[joint.parent] @ joint.motion(positions[joint.name])
         return poses
 
-    def _positions(self, given: Mapping[str, float]) -> dict[str, float]:
+    def positions(self, given: Mapping[str, float]) -> dict[str, float]:
+        """Return the positions of all joints in rad and m; those that mimic others follow them.
+
+        Args:
+            given: Positions by joint; others are at 0.
+
+        Raises:
+            ArgumentError: A position is not a finite number.
+        """
         positions: dict[str, float] = {}
         for joint in self.joints.values():
             followers = []

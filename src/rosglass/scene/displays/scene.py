@@ -62,6 +62,7 @@ class Scene(Element):
 
     Attributes:
         root: All drawables, in the fixed frame.
+        ask_again_s: After how many seconds a robot is asked again for files that it did not send.
         draws_in_software: Whether the processor draws, as far as is known.
         has_tf_publishers: Whether transforms have a publisher.
     """
@@ -106,7 +107,7 @@ class Scene(Element):
         self._followed_at = self._reset_at = -math.inf
         self._resets = single_shot(self, self._begin_anew)
         self._ask_timer = single_shot(self, self._ask_again)
-        self._ask_again_s = _ASK_AGAIN_S
+        self.ask_again_s = _ASK_AGAIN_S
         self.root.on_change = self.changed.emit
         root = self.root
 
@@ -496,8 +497,8 @@ class Scene(Element):
     def _ask_later(self) -> None:
         """Ask servers of files again that have not answered, less and less often."""
         if is_alive(self) and not self._ask_timer.isActive():
-            self._ask_timer.start(int(self._ask_again_s * 1000))
-            self._ask_again_s = min(2 * self._ask_again_s, _MAX_ASK_AGAIN_S)
+            self._ask_timer.start(int(self.ask_again_s * 1000))
+            self.ask_again_s = min(2 * self.ask_again_s, _MAX_ASK_AGAIN_S)
 
     @Slot()
     def _ask_again(self) -> None:
@@ -505,7 +506,7 @@ class Scene(Element):
 
     def _on_asked_again(self, uris: list[str] | Error) -> None:
         if is_alive(self) and uris and not isinstance(uris, Error):
-            self._ask_again_s = _ASK_AGAIN_S
+            self.ask_again_s = _ASK_AGAIN_S
             for display in self._alive():
                 self._call(display, lambda one: one.on_files(uris))
 
@@ -611,7 +612,7 @@ class Scene(Element):
         for one in self._resources:
             one.retry()
         self._ask_timer.stop()
-        self._ask_again_s = _ASK_AGAIN_S
+        self.ask_again_s = _ASK_AGAIN_S
         self._each(restart)
 
     def _each(self, job: Callable[[Display], None]) -> None:

@@ -316,11 +316,14 @@ class Origins:
 
     Each reader has its own: a sample that is dropped unread leaves its origin behind, and its
     address may later be that of another reader's sample.
+
+    Attributes:
+        recorded: Those of samples that are not taken yet, by the address of the sample.
     """
 
     def __init__(self) -> None:
         self._type = 0
-        self._recorded: dict[int, Origin] = {}
+        self.recorded: dict[int, Origin] = {}
         self._take: Take | None = None
 
     def create_topic(self, participant: int, name: str, type_name: str) -> int:
@@ -343,7 +346,7 @@ class Origins:
         Args:
             serdata: The sample's address, while the caller still holds a reference to it.
         """
-        return self._recorded.pop(serdata, None)
+        return self.recorded.pop(serdata, None)
 
     def set_receiver(self, take: Take | None) -> None:
         """Set the function that takes samples of other processes on their receiving thread.
@@ -362,22 +365,22 @@ class Origins:
         self._take = None
         if _readers.get(self._type) is self:
             del _readers[self._type]
-        self._recorded.clear()
+        self.recorded.clear()
 
     def record(self, serdata: int, fragments: int) -> None:
         """Record the origin of a sample just created from fragments, and deliver it."""
-        self._recorded.pop(serdata, None)
+        self.recorded.pop(serdata, None)
         found = _read(fragments)
         if found is None:
             return
-        while len(self._recorded) >= _MAX_ORIGINS:
-            self._recorded.pop(next(iter(self._recorded)), None)
-        self._recorded[serdata] = found
+        while len(self.recorded) >= _MAX_ORIGINS:
+            self.recorded.pop(next(iter(self.recorded)), None)
+        self.recorded[serdata] = found
         take = self._take
         if take is not None:
             library_with_gil().ddsi_serdata_ref(serdata)
             if take(found, payload(serdata)):
-                self._recorded[serdata] = found._replace(taken=True)
+                self.recorded[serdata] = found._replace(taken=True)
 
 
 class _Reading(Hook):
@@ -418,7 +421,7 @@ class _Reading(Hook):
         try:
             serdata = from_ser(sertype, SDK_DATA, ctypes.addressof(rdata), len(data))
         finally:
-            found = dict(origins._recorded)
+            found = dict(origins.recorded)
             origins.close()
         expect(bytes(payload(serdata)), data)
         expect(found, {serdata: sent})

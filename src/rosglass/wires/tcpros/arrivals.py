@@ -110,25 +110,27 @@ class BacklogMonitor:
 
     Attributes:
         late: Seconds by which the last message is late.
+        period: The usual interval between two messages in seconds, 0 if there is none.
+        received_at: When the last message arrived, by :func:`time.monotonic`; 0 before the first.
     """
 
     def __init__(self) -> None:
         self.late = 0.0
-        self._period = self._known_at = self._received_at = 0.0
+        self.period = self._known_at = self.received_at = 0.0
         #: Messages at the usual interval, and since when.
         self._steady, self._steady_since = 0, 0.0
 
     def set_period(self, period: float, now: float) -> None:
         """Set the usual interval between two messages in seconds, 0 if there is none now."""
         if period:
-            self._period, self._known_at = period, now
+            self.period, self._known_at = period, now
         elif now - self._known_at > _PERIOD_MEMORY_S:
-            self._period = self.late = 0.0
+            self.period = self.late = 0.0
 
     def add(self, count: int, now: float) -> None:
         """Add messages that arrived together, at least one; `now` by :func:`time.monotonic`."""
-        before, self._received_at = self._received_at, now
-        gap, period = now - before, self._period
+        before, self.received_at = self.received_at, now
+        gap, period = now - before, self.period
         if not (period and before):
             return
         missing = gap - count * period

@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from inside import core_of
 from rosmaster import RosMaster
 from two_machines import HERE, THERE, Cable
 from waiting import eventually
@@ -51,7 +52,7 @@ with Cable() as cable, RosMaster(Path(sys.argv[1])) as master:
     def ports(node: rosglass.Node) -> list[int]:
         """Return the ports of a node's API and of its topics."""
         api = urlsplit(master.call("lookupNode", f"/{node.name}"))
-        return [int(api.port or 0), int(node._core.address[1])]
+        return [int(api.port or 0), int(core_of(node).address[1])]
 
     with rosglass.connect(url, "own", own_services=False) as own:
         own.create_publisher("/cmd_vel", "geometry_msgs/Twist")
