@@ -13,8 +13,8 @@ from contextlib import suppress
 from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
-from rosglass.comm.executor import RetryingExecutor, check_plain, reraise_exit
-from rosglass.comm.handle import Executor, Handle, Unique
+from rosglass.comm.executor import RetryingExecutor, check_plain
+from rosglass.comm.handle import Executor, Handle, Unique, guarded, reraise_exit
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.log_limits import FailureLog
 from rosglass.comm.rclpy_names import hint_at_members
@@ -277,10 +277,8 @@ class Clock(Unique):
                 )
             self._set_alarm()
         for timer in due:
-            try:
+            with guarded(_log, "%s failed", timer):
                 timer.fire()
-            except BaseException:  # noqa: BLE001, PERF203 - sys.exit() must not end the others
-                _log.exception("%s asked to end its thread, which goes on", timer)
 
 
 class _Watcher(Handle):

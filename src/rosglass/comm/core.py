@@ -6,12 +6,13 @@ import atexit
 import os
 import threading
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.clock import Clock
 from rosglass.comm.executor import Dispatcher
 from rosglass.comm.graph import ConnectionState, EndpointKind, GraphView, Status
-from rosglass.comm.handle import Handle
+from rosglass.comm.handle import Handle, guarded
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.timers import Timers, Worker
 from rosglass.errors import NodeClosedError
@@ -240,10 +241,8 @@ class NodeCore(ABC):
         atexit.unregister(self.close)
         self.clock.close()
         for member in reversed(members):
-            try:
+            with guarded(self.log, "%s cannot be closed", member):
                 member.close()
-            except Exception:  # noqa: PERF203 - the others must be closed nevertheless
-                self.log.exception("%s cannot be closed", member)
         self.timers.close()
         self._disconnect()
         self._worker.close()
@@ -279,12 +278,9 @@ class NodeCore(ABC):
         with self._lock:
             members = list(self._members.items())
         for member, follow in members:
-            try:
+            # Another thread may close it at any time.
+            with guarded(self.log, "%s cannot follow the graph", member), suppress(NodeClosedError):
                 follow(moved, idle)
-            except NodeClosedError:  # noqa: PERF203 - another thread may close it at any time
-                pass
-            except Exception:  # the other members must follow it all the same
-                self.log.exception("%s cannot follow the graph", member)
         if moved:
             self.graph_listeners.notify(None)
 

@@ -1,15 +1,18 @@
-"""Base classes for handles and executors, and checks of arguments."""
+"""Base classes for handles and executors, guards of code that may fail, checks of arguments."""
 
 from __future__ import annotations
 
 import sys
+import threading
 from abc import ABC, abstractmethod
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 from rosglass.errors import ArgumentError, UnsupportedError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    import logging
+    from collections.abc import Callable, Iterator
     from types import FrameType, TracebackType
 
 __all__ = [
@@ -18,6 +21,9 @@ __all__ = [
     "Unique",
     "check_flag",
     "check_may_wait",
+    "guarded",
+    "reraise_exit",
+    "undo_on_error",
 ]
 
 _H = TypeVar("_H", bound="Handle")
@@ -63,6 +69,42 @@ class Handle(Unique, ABC):
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+@contextmanager
+def guarded(log: logging.Logger, text: str, *args: object) -> Iterator[None]:
+    """Log any error of the body, and go on after it.
+
+    For bodies that others must not be lost with: a callback of the user's, one of many members,
+    samples or jobs, on a thread that must not end. Errors that end the program, SystemExit and
+    KeyboardInterrupt, are raised in the main thread.
+
+    Args:
+        log: The logger to write to.
+        text: What has failed, as for :meth:`logging.Logger.exception`.
+        args: Its arguments.
+    """
+    try:
+        yield
+    except BaseException as error:
+        reraise_exit(error)
+        log.exception(text, *args)
+
+
+@contextmanager
+def undo_on_error(undo: Callable[[], object]) -> Iterator[None]:
+    """Call `undo` if the body raises anything, Ctrl-C included, and raise that again."""
+    try:
+        yield
+    except BaseException:
+        undo()
+        raise
+
+
+def reraise_exit(error: BaseException) -> None:
+    """Raise an error that ends the program in the main thread; it must not end other threads."""
+    if not isinstance(error, Exception) and threading.current_thread() is threading.main_thread():
+        raise error
 
 
 def check_flag(value: object, name: str, where: str = "") -> bool:

@@ -14,7 +14,8 @@ from contextlib import suppress
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.comm.executor import IMMEDIATE, RetryingExecutor, reraise_exit
+from rosglass.comm.executor import IMMEDIATE, RetryingExecutor
+from rosglass.comm.handle import reraise_exit
 from rosglass.comm.log_limits import FailureLog
 from rosglass.comm.qos import History
 from rosglass.comm.statistics import (

@@ -12,7 +12,7 @@ from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.client import Client, copy_value
-from rosglass.comm.handle import check_may_wait
+from rosglass.comm.handle import check_may_wait, guarded, undo_on_error
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.service_server import decode_checked, served_by_this_thread
@@ -295,7 +295,7 @@ class ServiceClient(Client):
         check_may_wait(self.name)
         timeout = check_timeout(timeout, self.name)
         pending = self._enter(request, timeout, private=True)
-        try:
+        with undo_on_error(pending.call.cancel):
             self._requester.send(pending)
             if timeout is not None:
                 try:
@@ -304,9 +304,6 @@ class ServiceClient(Client):
                     # Raised by the call, or by the wait for it; in the latter case it ends here.
                     self._expire(pending)
             return pending.call.result()
-        except BaseException:
-            pending.call.cancel()  # Ctrl-C
-            raise
 
     def call_async(
         self,
@@ -416,7 +413,7 @@ class ServiceClient(Client):
         if pending.call.done():
             return
         pending.answered = True
-        try:
+        with guarded(_log, "%s: processing a response failed", self.name):
             if data is not None:
                 self._complete(pending, data)
             elif isinstance(error, Error):
@@ -428,8 +425,6 @@ class ServiceClient(Client):
                 pending.call.set_exception(
                     ServiceError(f"the call of {self.name} failed: {reason}")
                 )
-        except Exception:  # noqa: BLE001 - on a receiving thread, which must go on
-            _log.exception("%s: processing a response failed", self.name)
 
     def _complete(self, pending: PendingCall, data: bytes | memoryview) -> None:
         assert pending.type is not None  # it was sent

@@ -48,7 +48,14 @@ def load_yaml(text: str, loader: Any = None) -> list[Any]:
         return list(yaml.load_all(text, Loader=loader or yaml.SafeLoader))
     except yaml.YAMLError:
         raise
-    except Exception as error:  # invalid dates, numbers and tags
+    except (
+        ValueError,
+        LookupError,
+        AttributeError,
+        TypeError,
+        ArithmeticError,
+        RecursionError,
+    ) as error:  # invalid dates, numbers and tags
         raise yaml.YAMLError(f"{type(error).__name__}: {error}") from error
 
 

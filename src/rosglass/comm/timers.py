@@ -9,7 +9,7 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.comm.handle import Handle
+from rosglass.comm.handle import Handle, guarded
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -98,10 +98,8 @@ class Timers:
                     job = heapq.heappop(self._jobs)[2].take()
                     if job is None:
                         self._cancelled = max(0, self._cancelled - 1)
-            try:
+            with guarded(_log, "%s: a job failed", self._name):
                 job()
-            except BaseException:  # noqa: BLE001 - sys.exit() in one job must not end the others
-                _log.exception("%s: a job failed", self._name)
 
 
 class _Job(Handle):
@@ -170,10 +168,8 @@ class Worker:
             regular = now >= due
             if regular:
                 due = now + self._pause
-            try:
+            with guarded(_log, "%s failed", self._thread.name):
                 self._job(regular)
-            except Exception:  # noqa: BLE001 - the next round must come
-                _log.exception("%s failed", self._thread.name)
             self._closed.wait(min(_MAX_REST_S, _REST_FACTOR * (time.monotonic() - now)))
 
 

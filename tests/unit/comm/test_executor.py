@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import logging
 import math
 import threading
 import time
@@ -9,6 +10,7 @@ import pytest
 from waiting import nothing_happens
 
 from rosglass.comm import IMMEDIATE, Dispatcher, Listeners, Worker
+from rosglass.comm.handle import guarded, undo_on_error
 
 
 @pytest.fixture
@@ -41,6 +43,40 @@ def test_a_failing_job_is_logged_and_the_next_one_runs(kind, dispatcher, caplog)
     run_all(dispatcher)
     assert seen == [1]
     assert "ZeroDivisionError" in caplog.text
+
+
+@pytest.mark.parametrize("error", [SystemExit, KeyboardInterrupt, GeneratorExit, ValueError])
+def test_no_error_ends_a_thread_that_others_need(error, dispatcher, caplog):
+    def fail():
+        raise error("of a job")
+
+    def fail_guarded():
+        with guarded(logging.getLogger("rosglass"), "%s has failed", "a guarded job"):
+            fail()
+        seen.append("after it")
+
+    seen = []
+    dispatcher.post(fail)
+    dispatcher.post(fail_guarded)
+    run_all(dispatcher)
+    assert seen == ["after it"]
+    assert caplog.text.count(f"{error.__name__}: of a job") == 2
+    assert "a guarded job has failed" in caplog.text
+
+
+@pytest.mark.parametrize("error", [SystemExit, KeyboardInterrupt])
+def test_the_main_thread_can_be_ended_from_guarded_code(error):
+    with pytest.raises(error), guarded(logging.getLogger("rosglass"), "a job failed"):
+        raise error
+
+
+def test_any_error_undoes_what_was_begun_and_is_raised_again():
+    undone = []
+    with undo_on_error(lambda: undone.append("not this")):
+        pass
+    with pytest.raises(KeyboardInterrupt), undo_on_error(lambda: undone.append("this")):
+        raise KeyboardInterrupt
+    assert undone == ["this"]
 
 
 def test_closing_ends_the_thread_and_forgets_what_waits(dispatcher):

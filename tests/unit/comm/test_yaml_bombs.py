@@ -38,6 +38,9 @@ BOMBS = {
     "no date": "a: 2001-99-99",
     "an empty number": "a: !!int ''",
     "no flag": "a: !!bool maybe",
+    "no time": "a: !!timestamp soon",
+    "the time of a mapping": "a: !!timestamp {=: 1}",
+    "too large a float": "a: !!float " + "1:" * 400 + "1.0",
     "unhashable": "{[1]: 1, {a: 1}: 2}",
     "an unknown tag": "!!python/object/apply:os.system ['true']",
 }

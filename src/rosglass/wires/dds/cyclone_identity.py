@@ -45,6 +45,7 @@ from ctypes import (
 )
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rosglass.comm.handle import undo_on_error
 from rosglass.wires.dds import cyclone
 from rosglass.wires.dds.cyclone import library_with_gil
 from rosglass.wires.dds.cyclone_samples import COPIED, payload
@@ -98,7 +99,7 @@ class Hook(ABC):
         """Create a topic whose type has replaced functions; see `cyclone.create_topic`."""
         with _lock:
             topic = cyclone.create_topic(participant, name, type_name, own_type=True)
-            try:
+            with undo_on_error(lambda: cyclone.delete(topic)):
                 sertype = cyclone.sertype(topic)
                 if not self._tested:
                     self._tested = True
@@ -107,9 +108,6 @@ class Hook(ABC):
                         _log.warning("%s", self.problem)
                 elif not self.problem:
                     self._install(sertype)
-            except BaseException:
-                cyclone.delete(topic)
-                raise
         return topic
 
     def prepare(self, sertype: int) -> None:

@@ -9,6 +9,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Durability, History, Reliability
+from rosglass.comm.handle import undo_on_error
 from rosglass.comm.names import mangle_type
 from rosglass.comm.wire import Reader, Writer
 from rosglass.errors import NodeClosedError, TimeoutError  # noqa: A004 - the field's own word
@@ -100,7 +101,7 @@ class SampleWriter:
         self._flow: FlowControl | None = None
         with participant.in_use():
             self._topic = make_topic(participant.entity, topic, dds_type)
-            try:
+            with undo_on_error(lambda: cyclone.delete(self._topic)):
                 policies = qos_of(qos, writer=True, user_data=user_data)
                 if qos.reliability is Reliability.RELIABLE:
                     policies.wait_at_most(self._slice_s)
@@ -109,9 +110,6 @@ class SampleWriter:
                 )
                 self.guid = cyclone.guid(self.entity)
                 self._type = cyclone.sertype(self.entity)
-            except BaseException:
-                cyclone.delete(self._topic)
-                raise
             participant.call_before_close(self.entity, self._stop)
 
     def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
@@ -243,14 +241,11 @@ class SampleReader:
         self._events = Event.NONE if on_matched is None else Event.SUBSCRIPTION_MATCHED
         with participant.in_use():
             self._topic = make_topic(participant.entity, topic, dds_type)
-            try:
+            with undo_on_error(lambda: cyclone.delete(self._topic)):
                 self.entity = cyclone.create_reader(
                     participant.entity, self._topic, policies, place
                 )
                 self.guid = cyclone.guid(self.entity)
-            except BaseException:
-                cyclone.delete(self._topic)
-                raise
 
     def start(self) -> None:
         """Start delivering samples."""

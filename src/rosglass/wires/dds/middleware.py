@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState, EndpointKind, Handle, Status
+from rosglass.comm.handle import guarded
 from rosglass.comm.wire import Middleware, Reader, Replier, Requester, Writer
 from rosglass.errors import DecodeError, Error, NodeClosedError
 from rosglass.wires.dds import cyclone
@@ -132,10 +133,8 @@ class DdsDiscovery:
         return more
 
     def _put_endpoint(self, found: Discovered, *, reader: bool) -> None:
-        try:
+        with guarded(_log, "the discovered DDS endpoint %s is not understood", found.guid.hex()):
             self._seen.put_endpoint(found, reader=reader)
-        except Exception:  # noqa: BLE001 - the others must not be lost with it
-            _log.exception("the discovered DDS endpoint %s is not understood", found.guid.hex())
 
     def _take_participants(self) -> None:
         """Take participants, always before their endpoints."""

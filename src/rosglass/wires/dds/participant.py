@@ -9,6 +9,7 @@ from collections import deque
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from rosglass.comm.handle import undo_on_error
 from rosglass.errors import NodeClosedError
 from rosglass.wires.dds import cyclone
 from rosglass.wires.dds.cyclone import Event, Qos, Waitset, set_events
@@ -81,7 +82,7 @@ class Participant:
         self._domain = Domain(options)
         self.fragment_size = fragment_size(options)
         self.large_sample_advice = large_sample_advice(options)
-        try:
+        with undo_on_error(self._domain.close):
             qos = Qos()
             qos.set_user_data(PARTICIPANT_USER_DATA)
             self.entity = cyclone.create_participant(options.domain, qos)
@@ -89,9 +90,6 @@ class Participant:
             self.guid = cyclone.guid(self.entity)
             self.pump = Pump(self.entity, f"DDS domain {options.domain}")
             self.lingering = LingeringWriters(self.pump)
-        except BaseException:
-            self._domain.close()
-            raise
 
     def nodes(self) -> tuple[NodeEntities, ...]:
         """Return its nodes with the GUIDs of their readers and writers."""

@@ -19,6 +19,7 @@ from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm import EndpointKind
+from rosglass.comm.handle import undo_on_error
 from rosglass.comm.names import mangle_type
 from rosglass.errors import Error, NodeClosedError
 from rosglass.wires.dds import cyclone, cyclone_identity
@@ -237,11 +238,8 @@ class ServiceEndpoints:
         participant.add_endpoint(self._node, self.reader.guid, writer=False)
         _here[participant.guid[:PREFIX]] += 1
         if not server or self._is_discovery_settled():
-            try:
+            with undo_on_error(self.close):
                 self._open()
-            except BaseException:
-                self.close()
-                raise
 
     def start(self) -> None:
         """Start delivering samples and reporting matches."""

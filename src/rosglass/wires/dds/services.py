@@ -18,6 +18,7 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rosglass.comm.handle import guarded
 from rosglass.comm.wire import SERVER_LEFT, Replier, Requester, RequestId
 from rosglass.errors import NodeClosedError, ServiceError, TimeoutError, UnsupportedError  # noqa: A004
 from rosglass.wires.dds import cyclone_identity
@@ -262,10 +263,8 @@ class DdsRequester(Requester):
             server, origin = self._endpoints.find_sender(handle, described)
             if origin is not None and origin.taken:
                 continue
-            try:
+            with guarded(_log, "%s: a reply is lost", self._service):
                 self._take(None if server is None else server.guid, data, origin)
-            except Exception:  # noqa: BLE001 - the others must not be lost with it
-                _log.exception("%s: a reply is lost", self._service)
 
     def _take(self, server: bytes | None, data: bytes | memoryview, origin: Origin | None) -> None:
         related = None if origin is None else origin.related
@@ -479,10 +478,8 @@ class DdsReplier(Replier):
             if odd or client is None or self._pumped or not self.quick:
                 self._pumped[id(origin)] = origin
                 return False
-        try:
+        with guarded(_log, "%s: a request is lost", self._service):
             self._take(client, data, origin)
-        except Exception:  # noqa: BLE001 - the others must not be lost with it
-            _log.exception("%s: a request is lost", self._service)
         return True
 
     def _on_requests(self, taken: list[Taken]) -> None:
@@ -490,13 +487,11 @@ class DdsReplier(Replier):
             client, origin = self._endpoints.find_sender(handle, described)
             if origin is not None and origin.taken:
                 continue
-            try:
+            with guarded(_log, "%s: a request is lost", self._service):
                 if client is not None:
                     self._take(client, data, origin)
                 else:
                     _log.error("%s: a request is lost: who sent it is gone", self._service)
-            except Exception:  # noqa: BLE001 - as above
-                _log.exception("%s: a request is lost", self._service)
             if origin is not None:
                 self._on_pumped(origin)
 

@@ -93,7 +93,7 @@ def announced_definition(
             raise TimeoutError(f"the type that it announces is not sent (code {found})")
         try:
             return TypeObject.deserialize(found, has_header=False, use_version_2=True).complete
-        except Exception as error:
+        except Exception as error:  # a peer's bytes make the parser raise all kinds of errors
             raise DefinitionError(f"its type cannot be read: {error}", "<TypeLookup>") from error
 
     described = parse_type_description(describe_struct(root, fetch), provider=provider)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState, Status
 from rosglass.comm.core import NodeCore
+from rosglass.comm.handle import guarded
 from rosglass.comm.types import Types
 from rosglass.errors import (
     ConnectionLostError,
@@ -272,10 +273,8 @@ class BlockingPool:
                     self._threads -= 1
                     return
                 job = self._jobs.popleft()
-            try:
+            with guarded(_log, "%s: a job failed", self._name):
                 job()
-            except Exception:  # noqa: BLE001 - the next jobs must run
-                _log.exception("%s: a job failed", self._name)
 
 
 class AnnouncedTypes(Types):

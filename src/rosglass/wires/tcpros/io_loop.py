@@ -14,6 +14,7 @@ from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
+from rosglass.comm.handle import guarded
 from rosglass.errors import ConnectionLostError
 
 if TYPE_CHECKING:
@@ -232,10 +233,8 @@ class IoLoop:
         self._run_job(lambda: handler.end(reason))
 
     def _run_job(self, job: Callable[[], None]) -> None:
-        try:
+        with guarded(_log, "%s: a job failed", self._thread.name):
             job()
-        except BaseException:  # noqa: BLE001 - the other jobs must run
-            _log.exception("%s: a job failed", self._thread.name)
 
 
 def _set(

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState, EndpointKind, Status
 from rosglass.comm.core import NodeMember
+from rosglass.comm.handle import guarded
 from rosglass.comm.log_limits import LogOnce
 from rosglass.errors import ConnectionLostError, Error, MasterError
 from rosglass.wires.tcpros.address import explain_unreachable, own_address, parse_uri
@@ -150,10 +151,8 @@ class Registrations:
             self._wanted.clear()
             if self._closing:
                 break
-            try:
+            with guarded(_log, "%s failed", self._thread.name):
                 self._poll()
-            except Exception:  # noqa: BLE001 - the next poll tries again
-                _log.exception("%s failed", self._thread.name)
             self._wanted.wait(_POLL_S)
         self._leave()
 

@@ -16,6 +16,7 @@ import zenoh
 import zenoh.ext
 
 from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
+from rosglass.comm.handle import guarded
 from rosglass.comm.wire import Writer
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.wires.zenoh.command_window import CommandWindow
@@ -431,13 +432,11 @@ class ZenohWriter(Declaration, Writer):
 def receive_directly(callback: Callable[[Any], None]) -> Any:
     """Run a callback on the receiving thread; only for data of other sessions."""
 
-    def guarded(item: Any) -> None:
-        try:
+    def receive(item: Any) -> None:
+        with guarded(_log, _FAILURE):  # Zenoh would only print it
             callback(item)
-        except Exception:  # noqa: BLE001 - Zenoh would only print it
-            _log.exception(_FAILURE)
 
-    return zenoh.handlers.Callback(guarded, indirect=False)
+    return zenoh.handlers.Callback(receive, indirect=False)
 
 
 class Pump:

@@ -22,6 +22,7 @@ from rosglass.comm import (
     NodeName,
     Status,
 )
+from rosglass.comm.handle import undo_on_error
 from rosglass.comm.timers import Timers
 from rosglass.comm.wire import (
     Middleware,
@@ -342,7 +343,8 @@ class ZenohMiddleware(Middleware):
             raise ConnectionLostError(f"cannot open a Zenoh session: {reason(error)}") from error
         self._retries_open = False
         self._settled = time.monotonic() + _SETTLING_TIME_S
-        try:
+        # A pump that waits in Zenoh while the interpreter shuts down would abort the program.
+        with undo_on_error(lambda: close_session(session)):
             events = session.info.declare_transport_events_listener(CHANNEL, history=True)
             tokens = session.liveliness().declare_subscriber(
                 graph_key(self.options.domain), CHANNEL, history=True
@@ -351,10 +353,6 @@ class ZenohMiddleware(Middleware):
                 Pump(events, self._on_transport, f"{self._address} links"),
                 Pump(tokens, self._on_token, f"{self._address} tokens"),
             ]
-        except BaseException:  # Ctrl-C
-            # A pump that waits in Zenoh while the interpreter shuts down would abort the program.
-            close_session(session)
-            raise
         if not self._is_peer:
             self._await_history(session)
         with self._lock:

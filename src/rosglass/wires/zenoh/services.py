@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import zenoh
 
 from rosglass.comm import ConnectionState, EndpointKind
+from rosglass.comm.handle import guarded
 from rosglass.comm.wire import (
     CALL_DROPPED,
     SERVER_LEFT,
@@ -127,10 +128,8 @@ class _ReplyHandler:
         self._requester, self._pending = requester, pending
 
     def __call__(self, reply: zenoh.Reply) -> None:
-        try:
+        with guarded(_log, "handling a reply failed"):
             self._requester.on_reply(self._pending, reply)
-        except Exception:  # noqa: BLE001 - Zenoh would only print it
-            _log.exception("handling a reply failed")
 
 
 class _QueryEnd(weakref.ref[_ReplyHandler]):
