@@ -31,6 +31,7 @@ from rosglass.bags.bag import (
     write_profiles,
 )
 from rosglass.comm import Durability, QoS
+from rosglass.comm.handle import undo_on_error
 from rosglass.errors import BagError, InvalidNameError
 from rosglass.interfaces import ros1_name, schema_text
 from rosglass.interfaces.names import join_name
@@ -73,11 +74,8 @@ class McapBag(ScannedBag):
         self._foreign: dict[str, str] = {}
         self._chunks: list[ChunkIndex] = []
         self._problems = ""
-        try:
+        with undo_on_error(self._file.close):
             self._index()
-        except BaseException:
-            self._file.close()
-            raise
         self._merge_channels()
         if self._foreign:
             names = ", ".join(f"{topic} ({what})" for topic, what in sorted(self._foreign.items()))

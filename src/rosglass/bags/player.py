@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Durability, Handle, QoS
+from rosglass.comm.handle import undo_on_error
 from rosglass.errors import BagError, Error, NodeClosedError
 from rosglass.messages import Translation
 
@@ -152,11 +153,8 @@ class Player(Handle):
         self._clock_period = 1.0 / clock if clock else 0.0
         self._clock_due = 0.0
         self._clock: Publisher | None = None
-        try:
+        with undo_on_error(self._close_publishers):
             self._advertise(remap or {})
-        except BaseException:
-            self._close_publishers()
-            raise
         self._thread = threading.Thread(target=self._run, name="player", daemon=True)
         self._thread.start()
 
@@ -556,7 +554,7 @@ class Playback(Handle):
         self.path, self._bag = bag.path, bag
         self.start, self.duration = bag.start, max(bag.duration, 0.0)
         self.has_clock = any(channel.topic == "/clock" for channel in bag.channels)
-        try:
+        with undo_on_error(bag.close):
             self._player = Player(
                 node,
                 bag,
@@ -569,9 +567,6 @@ class Playback(Handle):
                 hold=True,
                 context=context,
             )
-        except BaseException:
-            bag.close()
-            raise
 
     @property
     def position(self) -> float:

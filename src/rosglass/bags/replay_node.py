@@ -18,6 +18,7 @@ from rosglass.comm import (
     Status,
     Time,
 )
+from rosglass.comm.handle import undo_on_error
 from rosglass.comm.types import Types
 from rosglass.comm.wire import Writer
 from rosglass.errors import (
@@ -98,11 +99,8 @@ class ReplayNode(Ros2Node):
         wire = "ros1" if ros1 else "cdr"
         self._unprofiled = {channel.topic for channel in bag.channels if not channel.offered}
         local = f"local://replay-{uuid.uuid4().hex}"
-        try:
+        with undo_on_error(bag.close):
             super().__init__(_ReplayWire(local, wire), url, name, namespace)
-        except BaseException:
-            bag.close()
-            raise
         self._played = _ReplayWire(local, wire)
         self._played.arrival = lambda: self.clock.now().nanoseconds
         self._recording_node = _RecordingNode(self._played, url, "recording")
@@ -110,7 +108,7 @@ class ReplayNode(Ros2Node):
         self._core.types = self._recorded_types
         self._core.create_writer = lambda *_: _DiscardingWriter()
         self._core.clock.simulate(True)
-        try:
+        with undo_on_error(self._recording_node.close), undo_on_error(super().close):
             self.playback = Playback(
                 self._recording_node,
                 bag,
@@ -129,10 +127,6 @@ class ReplayNode(Ros2Node):
                 "/clock", "rosgraph_msgs/msg/Clock", qos=QoS.clock(),
                 raw_callback=self._on_clock, executor=IMMEDIATE,
             )  # fmt: skip
-        except BaseException:
-            super().close()
-            self._recording_node.close()
-            raise
         self._path = path
 
     def choose(self, topics: Iterable[str]) -> None:

@@ -23,6 +23,7 @@ from rosglass.comm import (
     ServiceClient,
     ServiceServer,
 )
+from rosglass.comm.handle import guarded
 from rosglass.errors import (
     ConnectionLostError,
     ConversionError,
@@ -201,10 +202,8 @@ class Outbox:
                     return
                 sample = self._waiting.popleft()
                 self._size -= len(sample.data)
-            try:
+            with guarded(_log, "%s failed", self._name):
                 self._handle(sample)
-            except Exception:  # noqa: BLE001 - the next samples must be relayed
-                _log.exception("%s failed", self._name)
 
 
 #: Seconds that a subscription is kept without subscribers in the target graph.

@@ -14,6 +14,7 @@ from rosglass.cli.network import refused
 from rosglass.cli.output import note
 from rosglass.cli.parser import TIMEOUT_S
 from rosglass.comm import ConnectionState, anonymous_name
+from rosglass.comm.handle import undo_on_error
 from rosglass.comm.names import hidden
 from rosglass.connection import default_url
 from rosglass.errors import ConnectionLostError, Error, TypeNotFoundError
@@ -85,11 +86,8 @@ def connect(args: argparse.Namespace, *, wait_for_start: bool = False) -> Node:
     )
     wait_for_start = wait_for_start or getattr(args, "timeout_given", False)
     timeout = TIMEOUT_S if args.timeout is None else args.timeout
-    try:
+    with undo_on_error(node.close):
         _wait_for_connection(node, timeout, wait_for_start)
-    except BaseException:
-        node.close()
-        raise
     return node
 
 
@@ -124,11 +122,8 @@ def join(url: str, name: str, timeout: float) -> Node:
         Error: As for :func:`connect`.
     """
     node = rosglass.connect(url, name=name, own_services=not url.lower().startswith("ros1:"))
-    try:
+    with undo_on_error(node.close):
         _wait_for_connection(node, timeout, wait_for_start=True)
-    except BaseException:
-        node.close()
-        raise
     return node
 
 

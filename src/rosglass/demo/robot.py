@@ -13,10 +13,12 @@ import random
 import threading
 import time
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import ParameterDescriptor, QoS, Range, Time
+from rosglass.comm.handle import guarded
 from rosglass.demo import telemetry
 from rosglass.demo.simulation import CommandRejectedError, Simulation
 from rosglass.demo.world import LaserScanner, occupancy
@@ -187,12 +189,10 @@ class Robot:
 
         def run() -> None:
             try:
-                work()
-            except NodeClosedError:
-                pass  # the node was closed first
-            except Exception:  # noqa: BLE001 - a robot that cannot see or report stops driving
-                _log.exception("the robot failed")
-            finally:
+                # The node may be closed first.
+                with guarded(_log, "the robot failed"), suppress(NodeClosedError):
+                    work()
+            finally:  # a robot that cannot see or report stops driving
                 self._ending.set()
 
         return run

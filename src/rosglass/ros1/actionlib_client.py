@@ -24,6 +24,7 @@ from rosglass.comm import (
 )
 from rosglass.comm.action_client import GRACE_S, OUTAGE_S, ActionClient, ClientGoal
 from rosglass.comm.executor import InOrder
+from rosglass.comm.handle import undo_on_error
 from rosglass.errors import (
     ConnectionLostError,
     DecodeError,
@@ -844,13 +845,10 @@ class _ClientTopics:
         }
         self._publishers: dict[str, Publisher] = {}
         self._subscriptions: dict[str, Subscription] = {}
-        try:
+        with undo_on_error(self.close):
             for word in (GOAL, CANCEL):
                 message_type = getattr(types, word)
                 self._publishers[word] = Publisher(core, self._names[word], message_type, QUEUE)
-        except BaseException:
-            self.close()
-            raise
         for word, callback in callbacks.items():
             subscription = Subscription(
                 self._names[word], getattr(types, word), QUEUE, IMMEDIATE, raw_callback=callback

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import IMMEDIATE, GoalStatus, Publisher, QoS, Subscription, Time
 from rosglass.comm.action_server import ActionServerProtocol, ServerGoal
 from rosglass.comm.executor import InOrder
-from rosglass.comm.handle import check_flag
+from rosglass.comm.handle import check_flag, undo_on_error
 from rosglass.errors import ArgumentError, DecodeError, Error, MasterError, NodeClosedError
 from rosglass.ros1.actionlib import (
     CANCEL,
@@ -274,13 +274,10 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
         """Open the topics."""
         self._server = server
         core, topics, name = self._core, self._topics, self.name
-        try:
+        with undo_on_error(self._close_publishers):
             for word, qos in ((STATUS, QoS.latched()), (RESULT, QUEUE), (FEEDBACK, QUEUE)):
                 topic = core.resolve(action_topic(name, word))
                 self._publishers[word] = Publisher(core, topic, getattr(self._types, word), qos)
-        except BaseException:
-            self._close_publishers()
-            raise
         self._publish_status()
         for word, callback in ((CANCEL, self._on_cancel), (GOAL, self._on_goal)):
             topic = core.resolve(action_topic(name, word))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import IMMEDIATE, History, Node, NodeName, QoS, Subscription
 from rosglass.comm.action_server import ActionServer
 from rosglass.comm.builtin_services import USE_SIM_TIME, BuiltinProtocol, BuiltinServices, SimTime
-from rosglass.comm.handle import check_flag, check_may_wait
+from rosglass.comm.handle import check_flag, check_may_wait, undo_on_error
 from rosglass.comm.log import NodeLog, RosoutTopic, clean, message_of
 from rosglass.comm.parameters import ParameterClient
 from rosglass.comm.promise import check_timeout
@@ -140,7 +140,7 @@ class Ros1Node(Node):
         namespace = absolute_namespace(namespace, "namespace", relative=False)
         self.url, self.name, self.namespace = url, name, namespace
         self._core = Core(NodeName(namespace, name), url, options, library)
-        try:
+        with undo_on_error(self._core.close):
             self._topics = self._core.topics
             self._services = Services(self._core)
             self._parameter_server = ParameterServer(self._core, parameters or {})
@@ -150,9 +150,6 @@ class Ros1Node(Node):
             )
             self._builtin_services.open(own_services)
             self._core.start(self._parameter_server.changed)
-        except BaseException:
-            self._core.close()
-            raise
 
     # -- topics ----------------------------------------------------------------------------------
 

@@ -22,6 +22,7 @@ from rosglass.comm import (
 )
 from rosglass.comm.client import Readiness
 from rosglass.comm.executor import check_plain
+from rosglass.comm.handle import undo_on_error
 from rosglass.comm.names import similar
 from rosglass.comm.parameters import RemoteParameters, check_values
 from rosglass.errors import ConnectionLostError, NodeClosedError, ParameterError, UnsupportedError
@@ -188,13 +189,10 @@ class Ros1Parameters(Parameters):
         mine = replace(descriptor)  # the same one may be given twice
         if self._declared.setdefault(name, mine) is not mine:
             raise ParameterError(f"{self.node}: parameter {name!r} is declared already")
-        try:
+        with undo_on_error(lambda: self._declared.pop(name, None)):
             value: ParameterValue = self._server.get(full, None)
             if value is None and default is not None:
                 self._server.set(full, default)
-        except BaseException:
-            self._declared.pop(name, None)
-            raise
         return default if value is None else value
 
     def undeclare(self, name: str) -> None:

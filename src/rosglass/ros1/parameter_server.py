@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm import Executor, Handle, Listeners, Promise
 from rosglass.comm.executor import InOrder
-from rosglass.comm.handle import check_may_wait
+from rosglass.comm.handle import check_may_wait, guarded
 from rosglass.comm.names import similar
 from rosglass.comm.promise import check_timeout
 from rosglass.errors import (
@@ -692,12 +692,9 @@ class ParameterWatch(Member):
 
     def _read_safely(self) -> None:
         self._wanted = False
-        try:
+        # The core looks for a master that is gone, and registers this again.
+        with guarded(_log, "%s failed", self), suppress(Error):
             self._read(self._core.master)
-        except Error:
-            pass  # the core looks for a master that is gone, and registers this again
-        except Exception:  # noqa: BLE001 - the next change reads again
-            _log.exception("%s failed", self)
         self._core.loop.call(self._on_read)
 
     def _on_read(self) -> None:

@@ -33,6 +33,7 @@ from rosglass.comm.action_client import (
 )
 from rosglass.comm.core import NodeMember
 from rosglass.comm.executor import InOrder
+from rosglass.comm.handle import guarded
 from rosglass.comm.inbox import DuplicateFilter
 from rosglass.comm.log_limits import LogOnce
 from rosglass.errors import (
@@ -686,19 +687,18 @@ class _ClientEndpoints(Handle):
             sequence: int,
             hash: str,
         ) -> None:
-            try:
-                if hash not in ("", ours):
-                    text = f"another definition of {kind.name} ({hash}, ours is {ours})"
-                    self._log_ignored(topic, gid, text)
-                elif not repeats.is_duplicate(gid, sequence, sent):
-                    if feedback:
-                        self._take_feedback(kind, data)
-                    else:
-                        self._take_status(kind, data)
-            except DecodeError as error:
-                self._log_ignored(topic, gid, str(error))
-            except Exception:  # noqa: BLE001 - on a receiving thread, which must go on
-                _log.exception("%s: taking %s failed", self._name, topic)
+            with guarded(_log, "%s: taking %s failed", self._name, topic):
+                try:
+                    if hash not in ("", ours):
+                        text = f"another definition of {kind.name} ({hash}, ours is {ours})"
+                        self._log_ignored(topic, gid, text)
+                    elif not repeats.is_duplicate(gid, sequence, sent):
+                        if feedback:
+                            self._take_feedback(kind, data)
+                        else:
+                            self._take_status(kind, data)
+                except DecodeError as error:
+                    self._log_ignored(topic, gid, str(error))
 
         return receive
 

@@ -12,6 +12,7 @@ from weakref import WeakValueDictionary
 from rosglass.comm import ConnectionState, Status
 from rosglass.comm.core import NodeCore
 from rosglass.comm.graph import Graph
+from rosglass.comm.handle import undo_on_error
 from rosglass.comm.listeners import ChangeListeners
 from rosglass.comm.names import expand
 from rosglass.comm.types import Types
@@ -77,13 +78,9 @@ class Core(NodeCore):
         self.status_listeners = ChangeListeners(middleware.status, middleware.status())
         self.graph = Graph(self.wake)
         self._worker = self._start_following()
-        try:
+        with undo_on_error(middleware.close), undo_on_error(self._worker.close):
             middleware.open(self.graph, self._worker.wake)
             middleware.announce(name)
-        except BaseException:
-            self._worker.close()
-            middleware.close()
-            raise
         # Threads that deliver samples must not run while the interpreter shuts down.
         atexit.register(self.close)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import IMMEDIATE, Node, NodeName, QoS, Subscription
 from rosglass.comm.action_server import ActionServer
 from rosglass.comm.builtin_services import USE_SIM_TIME, BuiltinProtocol, BuiltinServices, SimTime
-from rosglass.comm.handle import check_flag
+from rosglass.comm.handle import check_flag, undo_on_error
 from rosglass.comm.lifecycle import LifecycleClient
 from rosglass.comm.log import NodeLog, RosoutTopic, clean, message_of
 from rosglass.comm.names import validate_namespace, validate_node_name
@@ -91,12 +91,9 @@ class Ros2Node(Node):
         self.wire = middleware.wire
         self._core = Core(NodeName(namespace, name), url, middleware, library, arguments)
         self._builtin_services = BuiltinServices(self._core, RclServices(self, self._core))
-        try:
+        with undo_on_error(self._core.close):
             self._fetcher = TypeFetcher(self._core)
             self._builtin_services.open(own_services)
-        except BaseException:
-            self._core.close()
-            raise
 
     def _receive(
         self, subscription: Subscription, type: str | MessageType | None, ignore_local: bool

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rosglass.comm import EndpointKind, Handle, Promise
 from rosglass.comm.core import NodeMember
+from rosglass.comm.handle import guarded
 from rosglass.comm.promise import check_timeout
 from rosglass.errors import (
     DefinitionConflictError,
@@ -477,12 +478,11 @@ class TypeFetcher(NodeMember):
         if not request.promises and now - request.used > _INTEREST_S:
             self._drop(request)
         elif self._requests.get(request.key) is request and not self._closed:
-            try:
-                self._advance(request, self._users[1], now)
-            except NodeClosedError:
-                self._closed = True
-            except Exception:  # noqa: BLE001 - the other requests must go on
-                _log.exception("fetching %s failed", request.name)
+            with guarded(_log, "fetching %s failed", request.name):
+                try:
+                    self._advance(request, self._users[1], now)
+                except NodeClosedError:
+                    self._closed = True
 
     def _advance(self, request: TypeRequest, users: _Users, now: float) -> None:
         """Take the next possible steps to get a definition."""

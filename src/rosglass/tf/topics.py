@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import ConnectionState
 from rosglass.comm.executor import IMMEDIATE
-from rosglass.comm.handle import Handle
+from rosglass.comm.handle import Handle, undo_on_error
 from rosglass.comm.names import hidden
 from rosglass.comm.qos import QoS
 from rosglass.comm.statistics import StampMonitor
@@ -112,16 +112,10 @@ class TransformListener(Handle):
         self._origins: dict[tuple[str, bytes], _Origin] = {}
         self._stamps = StampMonitor()
         self._jumps = node.clock.on_jump(self._on_jump, executor=IMMEDIATE)
-        made: list[Subscription] = []
-        try:
+        self.subscriptions: tuple[Subscription, ...] = ()
+        with undo_on_error(self.close):
             for static in (False, True):
-                made.append(self._subscribe(topic_of(node, namespace, static), static))  # noqa: PERF401
-        except BaseException:
-            self._jumps.close()
-            for subscription in made:
-                subscription.close()
-            raise
-        self.subscriptions: tuple[Subscription, ...] = tuple(made)
+                self.subscriptions += (self._subscribe(topic_of(node, namespace, static), static),)
 
     def __repr__(self) -> str:
         topics = " and ".join(subscription.topic for subscription in self.subscriptions)

@@ -15,6 +15,7 @@ from rosglass.qml.elements.element import Element
 from rosglass.qml.engine.from_js import plain_from_js
 from rosglass.qml.engine.log import log_from_qml
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
+from rosglass.qml.engine.session import result_of
 from rosglass.qml.engine.to_js import exact
 from rosglass.qt import QJSValue, Signal, Slot, is_alive
 
@@ -234,17 +235,13 @@ class ParameterLink:
         return f"there is no node {self._name}{similar(self._name, names)}"
 
     def _ask(self, work: Callable[[ParameterClient], Any], done: Callable[[Any], None]) -> None:
+        def ask() -> Any:
+            if self._client is None:
+                raise ParameterError(f"the parameters of {self._name}: {self._failure}")
+            return work(self._client)
+
         def run() -> None:
-            client, result = self._client, None
-            try:
-                if client is None:
-                    raise ParameterError(f"the parameters of {self._name}: {self._failure}")
-                result = work(client)
-            except Error as error:
-                result = error
-            except Exception as error:  # noqa: BLE001 - the element shows it
-                _log.exception("asking for parameters failed")
-                result = Error(f"internal error: {error}")
+            result = result_of(ask, "asking for parameters")
             self._session.executor.post(lambda: None if self._closed else done(result))
 
         self._worker.post(run)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rosglass.comm.approximate_time import ApproximateTime
 from rosglass.comm.executor import Dispatcher
+from rosglass.comm.handle import undo_on_error
 from rosglass.comm.statistics import note_time, rate_of
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS, Element
@@ -80,12 +81,9 @@ class _Matcher:
         self._bad: dict[int, str] = {}
         self._worker = Dispatcher("rosglass-synchronizer")
         self.subscriptions: list[TopicSubscription] = []
-        try:
+        with undo_on_error(self.close):
             for index, (topic, type_name, qos) in enumerate(wanted):
                 self.subscriptions.append(self._subscribe(node, index, topic, type_name, qos))
-        except BaseException:
-            self.close()
-            raise
 
     @property
     def dropped(self) -> int:

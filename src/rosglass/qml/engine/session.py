@@ -18,9 +18,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, overload
 from weakref import WeakMethod
 
-from rosglass.comm.executor import Dispatcher
+from rosglass.comm.executor import Dispatcher, run_job
 from rosglass.comm.graph import ConnectionState, Status
-from rosglass.comm.handle import Executor
+from rosglass.comm.handle import Executor, guarded
 from rosglass.comm.names import validate_namespace, validate_node_name
 from rosglass.errors import ConnectionLostError, Error, InvalidNameError
 from rosglass.extras import explain_missing
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from rosglass.ros2.ros_arguments import Arguments
 
 
-__all__ = ["NOT_INITIALIZED", "GuiExecutor", "ScriptLimit", "Session", "weak_callback"]
+__all__ = ["NOT_INITIALIZED", "GuiExecutor", "ScriptLimit", "Session", "result_of", "weak_callback"]
 
 _log = logging.getLogger("rosglass.qml")
 
@@ -113,14 +113,23 @@ class GuiExecutor(Executor):
         for _ in range(len(self._turn)):
             # While a job waited, others may have been run.
             if self._turn:
-                _guarded(self._turn.popleft())
+                run_job(self._turn.popleft())  # raises nothing through Qt's event loop
 
 
-def _guarded(job: Callable[[], None]) -> None:
+def result_of(work: Callable[[], _T], what: str) -> _T | Error:
+    """Return the result of `work` or the error it raises, which is logged if it is one of ours.
+
+    Args:
+        work: May fail.
+        what: Its name for the log.
+    """
     try:
-        job()
-    except Exception:  # noqa: BLE001 - Qt's event loop calls this
-        _log.exception("a callback failed")
+        return work()
+    except Error as error:
+        return error
+    except Exception as error:  # noqa: BLE001 - its caller waits for a result, and shows the error
+        _log.exception("%s failed", what)
+        return Error(f"internal error: {error}")
 
 
 def weak_callback(method: Callable[..., Any], otherwise: Any = None) -> Callable[..., Any]:
@@ -559,14 +568,7 @@ class Session(QtCore.QObject):
             self._done[key] = done
 
         def run() -> None:
-            result: _T | Error
-            try:
-                result = work()
-            except Error as error:
-                result = error
-            except Exception as error:  # noqa: BLE001 - the job's caller gets it
-                _log.exception("a background job failed")
-                result = Error(f"internal error: {error}")
+            result = result_of(work, "a background job")
             if key in self._done:
                 self.executor.post(lambda: self._done.pop(key)(result))
 
@@ -788,10 +790,8 @@ def _call_all(handlers: dict[int, tuple[QtCore.QObject, Callable[[], None]]]) ->
     for item, handler in list(handlers.values()):
         # A handler may have destroyed other objects.
         if is_alive(item):
-            try:
+            with guarded(_log, "internal error in %s", type(item).__name__):
                 handler()
-            except Exception:  # noqa: BLE001 - the other handlers must run
-                _log.exception("internal error in %s", type(item).__name__)
 
 
 def _with_domain(url: str, domain: int) -> str:
