@@ -242,9 +242,7 @@ def decompress(compression: str, data: bytes, size: int | None) -> bytes:
         raise BagError(f"it declares {size} bytes, and {CHUNK_LIMIT} are the most")
     try:
         found = _DECOMPRESSORS[compression](data, CHUNK_LIMIT if size is None else size)
-    except BagError:
-        raise
-    except Exception as error:  # damaged data may raise anything in the libraries
+    except (ImportError, RuntimeError, OSError, EOFError, ValueError, MemoryError) as error:
         raise BagError(str(error) or type(error).__name__) from error
     if len(found) > (CHUNK_LIMIT if size is None else size):
         said = f"{CHUNK_LIMIT} bytes, the most" if size is None else f"the {size} bytes declared"
@@ -254,11 +252,16 @@ def decompress(compression: str, data: bytes, size: int | None) -> bytes:
 
 def _zstd(data: bytes, size: int) -> bytes:
     library: Any = import_module("zstandard")  # with mcap; no types
-    declared = library.frame_content_size(data)  # -1 when it is not in the frame
-    if declared > size:
-        raise BagError(f"its compressed data declares {declared} bytes, and {size} are the most")
-    # The library allocates no more than either size, and raises if there is more.
-    return bytes(library.ZstdDecompressor().decompress(data, max_output_size=size))
+    try:
+        declared = library.frame_content_size(data)  # -1 when it is not in the frame
+        if declared > size:
+            raise BagError(
+                f"its compressed data declares {declared} bytes, and {size} are the most"
+            )
+        # The library allocates no more than either size, and raises if there is more.
+        return bytes(library.ZstdDecompressor().decompress(data, max_output_size=size))
+    except library.ZstdError as error:
+        raise BagError(str(error)) from error
 
 
 def _lz4(data: bytes, size: int) -> bytes:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import logging
 import struct
+from contextlib import contextmanager
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -133,17 +134,14 @@ class McapBag(ScannedBag):
 
     def _indexed(self, file: BinaryIO, index: ChunkIndex) -> Iterator[tuple[int, int, bytes]]:
         """Yield the messages of an indexed chunk."""
-        try:
+        with self._damage_left_out(index.chunk_start_offset):
             file.seek(index.chunk_start_offset)
             chunk = next(StreamReader(file, skip_magic=True, emit_chunks=True).records)
             if not isinstance(chunk, Chunk):
                 raise BagError("the index names a chunk, and there is none")
-        except Exception as error:  # noqa: BLE001 - damaged data may raise anything
-            self._leave_out(index.chunk_start_offset, error)
-            return
-        for record in self._unpacked(chunk, index.chunk_start_offset):
-            if isinstance(record, tuple):
-                yield record
+            for record in self._unpacked(chunk, index.chunk_start_offset):
+                if isinstance(record, tuple):
+                    yield record
 
     def _scan(self) -> Iterator[tuple[int, int, bytes]]:
         """Read messages and channels from the start, up to the end or the first damage."""
@@ -185,7 +183,7 @@ class McapBag(ScannedBag):
 
         The package's own reader trusts declared sizes, and lists all records in memory.
         """
-        try:
+        with self._damage_left_out(offset):
             data = decompress(chunk.compression, chunk.data, chunk.uncompressed_size)
             place = 0
             while place < len(data):
@@ -204,8 +202,6 @@ class McapBag(ScannedBag):
                 elif opcode == Opcode.CHANNEL:
                     yield ChannelRecord.read(ReadDataStream(io.BytesIO(data[place:end])))
                 place = end
-        except Exception as error:  # noqa: BLE001 - damaged data may raise anything
-            self._leave_out(offset, error)
 
     def _add(self, number: int, channel: Any, schema: Any, count: int) -> None:
         wire = _WIRES.get(channel.message_encoding)
@@ -243,9 +239,14 @@ class McapBag(ScannedBag):
         _log.warning("%s: %s", self.path, problem)
         self._update_problem()
 
-    def _leave_out(self, offset: int, error: Exception) -> None:
-        self._left_out.add(f"at byte {offset}", error)
-        self._update_problem()
+    @contextmanager
+    def _damage_left_out(self, offset: int) -> Iterator[None]:
+        """Leave out what is left of a chunk after the first error."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001 - damaged data may raise anything
+            self._left_out.add(f"at byte {offset}", error)
+            self._update_problem()
 
     def _update_problem(self) -> None:
         self.problem = "; ".join(filter(None, (self._problems, self._left_out.words())))

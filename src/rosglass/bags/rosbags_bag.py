@@ -19,6 +19,7 @@ from rosbags.rosbag2 import storage_mcap, storage_sqlite3
 
 from rosglass.bags.bag import Bag, BagMessage, Channel, LeftOut, decompress, parse_profile
 from rosglass.comm import QoS
+from rosglass.comm.handle import undo_on_error
 from rosglass.comm.text_files import check_yaml, load_pyyaml, read_text
 from rosglass.errors import BagError
 from rosglass.interfaces.names import join_name
@@ -62,12 +63,17 @@ class RosbagsBag(Bag):
             ) from error
         self._open = True
         self._left_out = LeftOut(path, "message")
-        try:
+        with self._damage_reported(), undo_on_error(self.close):
             self._limit_decompression()
             self._index()
-        except Exception as error:  # metadata of wrong types
-            self.close()
-            raise BagError(f"{path} is damaged: {_describe(error)}") from error
+
+    @contextmanager
+    def _damage_reported(self) -> Iterator[None]:
+        """Raise errors of the package as BagError."""
+        try:
+            yield
+        except Exception as error:  # damaged data and metadata of wrong types may raise anything
+            raise BagError(f"{self.path} is damaged: {_describe(error)}") from error
 
     def _limit_decompression(self) -> None:
         """Decompress chunks and messages here, within the limit."""
@@ -113,7 +119,7 @@ class RosbagsBag(Bag):
         wanted = [c for c in self._reader.connections if (c.id, id(c.owner)) in owner]
         if not wanted:
             return
-        try:
+        with self._damage_reported():
             for connection, time, data in self._reader.messages(wanted, start, end):
                 channel, content = owner[connection.id, id(connection.owner)], bytes(data)
                 if self._by_message:
@@ -124,8 +130,6 @@ class RosbagsBag(Bag):
                         self.problem = self._left_out.words()
                         continue
                 yield BagMessage(channel, time, content)
-        except Exception as error:  # damaged data may raise anything
-            raise BagError(f"{self.path} is damaged: {_describe(error)}") from error
 
     def close(self) -> None:
         """Close the files."""
