@@ -20,6 +20,7 @@
 
     // Elements skipped when the length grew are defaults, as in the sent message.
     function filled(list) {
+        if (list.length !== 0) place(list.length - 1)
         const made = Array.from(list)
         for (let i = 0; i < made.length; ++i)
             if (made[i] === undefined) made[i] = list["#default"]()
