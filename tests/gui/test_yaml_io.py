@@ -180,6 +180,7 @@ def test_arrays_of_wide_integers_come_back(
         ("a: 12:30", {"a": "12:30"}),
         ("a: 18446744073709551615", {"a": str(2**64 - 1)}),
         ("a: yes", {"a": True}),
+        ("[y, n, no, on, off, true, false]", ["y", "n", False, True, False, True, False]),
         ("- &x {b: 1}\n- *x", [{"b": 1}, {"b": 1}]),
         ("<<: {a: 1}\nb: 2", {"a": 1, "b": 2}),
         ("2: a\ntrue: b", {"2": "a", "true": "b"}),
