@@ -1,4 +1,4 @@
-"""Defers Ctrl-C while Qt's bindings are imported, which swallow it or abort the process."""
+"""Ctrl-C while modules in C are imported, which swallow it or abort the process."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from types import FrameType, TracebackType
 
-__all__ = ["InterruptsDeferred"]
+__all__ = ["InterruptsDeferred", "end_at_once", "is_interrupt"]
 
 
 class InterruptsDeferred:
@@ -50,3 +50,19 @@ class InterruptsDeferred:
         if self._received:
             signal.default_int_handler(number, frame)
         self._received = True
+
+
+def end_at_once(*_: object) -> None:
+    """End the process as by Ctrl-C; a signal handler."""
+    import os  # noqa: PLC0415
+
+    os._exit(130)
+
+
+def is_interrupt(error: BaseException | None) -> bool:
+    """Return whether Ctrl-C caused an error: C extensions report it as an ImportError."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__cause__ or error.__context__
+    return False

@@ -7,7 +7,7 @@ import itertools
 
 import pytest
 
-from rosglass.qml.elements.image_subscription import LoadBalancer
+from rosglass.qml.elements.load_balancer import LoadBalancer
 
 
 def simulate(intervals: list[float], seconds: float) -> list[tuple[float, int]]:

@@ -200,7 +200,7 @@ def test_a_picture_does_not_fade_while_a_simulation_is_paused(
     bench: SceneBench, load: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass.scene.displays import image
-    from rosglass.scene.displays import scene as scenes
+    from rosglass.scene.displays import scene_frames as scenes
 
     monkeypatch.setattr(image, "_MAX_AGE_S", 1.0)
     monkeypatch.setattr(scenes, "_PAUSED_S", 0.3)

@@ -813,7 +813,7 @@ def test_a_mesh_that_was_missing_is_read_again(
     from web_server import WebServer
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr("rosglass.scene.displays.scene._ASK_AGAIN_S", 0.1)
+    monkeypatch.setattr("rosglass.scene.displays.scene_frames._ASK_AGAIN_S", 0.1)
     with WebServer() as web:
         uri = f"{web.url}/flat.obj"
         mesh = {**BOX, "type": 10, "mesh_resource": uri}

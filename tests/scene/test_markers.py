@@ -705,7 +705,7 @@ def test_meshes_of_markers_that_were_missing_are_read_again(
     from web_server import WebServer
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr("rosglass.scene.displays.scene._ASK_AGAIN_S", 0.1)
+    monkeypatch.setattr("rosglass.scene.displays.scene_frames._ASK_AGAIN_S", 0.1)
     triangle = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
     with WebServer() as web:
         web.files["/flat.obj"] = lambda request: request.send_error(503)

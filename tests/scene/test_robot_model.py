@@ -308,7 +308,7 @@ def test_a_web_server_that_was_down_is_asked_again(
 ) -> None:
     from web_server import WebServer
 
-    monkeypatch.setattr("rosglass.scene.displays.scene._ASK_AGAIN_S", 0.1)
+    monkeypatch.setattr("rosglass.scene.displays.scene_frames._ASK_AGAIN_S", 0.1)
     with WebServer() as web:
         web.files["/arm.stl"] = web.files["/hand.stl"] = lambda request: request.send_error(503)
         view = bench.load("RobotModelDisplay {}")

@@ -757,7 +757,7 @@ def test_displays_of_frames_fade_without_a_node(bench: SceneBench) -> None:
 def test_no_frame_fades_while_a_simulation_is_paused(bench: SceneBench, monkeypatch: Any) -> None:
     from rosglass import Time
     from rosglass.scene.displays import display as displays
-    from rosglass.scene.displays import scene as scenes
+    from rosglass.scene.displays import scene_frames as scenes
     from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 1.0)

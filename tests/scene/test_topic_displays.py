@@ -458,7 +458,7 @@ def test_continuous_measurements_fade_without_a_message(
 def test_a_sensor_may_send_nothing_while_a_simulation_is_paused(
     bench: SceneBench, monkeypatch: Any
 ) -> None:
-    from rosglass.scene.displays import scene as scenes
+    from rosglass.scene.displays import scene_frames as scenes
     from rosglass.scene.displays import topic_display as displays
 
     monkeypatch.setattr(displays, "_CONTINUOUS_S", 1.0)

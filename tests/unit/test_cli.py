@@ -83,7 +83,12 @@ def test_help_and_options_load_no_more_than_the_parser(monkeypatch: pytest.Monke
     done = run_python(code, stdout=subprocess.PIPE)
     loaded = ["arguments", "output", "parser", "program"]
     assert done.stdout == str(
-        ["rosglass.cli", *(f"rosglass.cli.{name}" for name in loaded), "rosglass.errors"]
+        [
+            "rosglass.cli",
+            *(f"rosglass.cli.{name}" for name in loaded),
+            "rosglass.errors",
+            "rosglass.interrupts",
+        ]
     )
 
 

@@ -120,9 +120,11 @@ def test_displays_are_derived_from_four_classes_at_most(milestones: Any) -> None
     assert len(line) <= 4, " <- ".join(line)
 
 
-def test_modules_import_each_other_in_pairs_at_most(milestones: Any) -> None:
+def test_modules_import_each_other_in_two_pairs_at_most(milestones: Any) -> None:
     # Imports for type checkers only and those in functions are counted, too.
-    assert milestones.cycles(milestones.import_graph(ROOT, milestones.read(ROOT))) == (0, 0)
+    graph = milestones.import_graph(ROOT, milestones.read(ROOT))
+    assert milestones.cycles(graph) == (0, 0)
+    assert milestones.circles(graph) <= 2
 
 
 def test_the_map_shows_the_folders_of_the_source_tree() -> None:

@@ -1,11 +1,14 @@
 """The ``rosglass`` command: a module per command, imported once the command line is parsed."""
 
-# Nothing is imported before main() can handle Ctrl-C; type checkers accept this name.
+# Nothing that takes time is imported before main() can handle Ctrl-C.
+from rosglass.interrupts import end_at_once, is_interrupt
+
+# Type checkers accept this name.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["end_at_once", "is_interrupt", "main"]
+__all__ = ["main"]
 
 
 def main(argv: "Sequence[str] | None" = None) -> int:
@@ -42,19 +45,3 @@ def main(argv: "Sequence[str] | None" = None) -> int:
         # Pressing it again cuts short whatever still has to end.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         return 130
-
-
-def end_at_once(*_: object) -> None:
-    """End the process as by Ctrl-C; a signal handler."""
-    import os  # noqa: PLC0415
-
-    os._exit(130)
-
-
-def is_interrupt(error: "BaseException | None") -> bool:
-    """Return whether Ctrl-C caused an error: C extensions report it as an ImportError."""
-    while error is not None:
-        if isinstance(error, KeyboardInterrupt):
-            return True
-        error = error.__cause__ or error.__context__
-    return False

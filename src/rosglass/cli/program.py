@@ -12,10 +12,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 import rosglass
-from rosglass.cli import end_at_once, is_interrupt
 from rosglass.cli.arguments import COMMANDS
 from rosglass.cli.output import EscapingStream, note
 from rosglass.cli.parser import Parser, add_verbose, is_completing
+from rosglass.interrupts import end_at_once, is_interrupt
 
 if TYPE_CHECKING:
     import argparse

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rosglass.overlay.overlay import Overlay
-    from rosglass.rviz.stack import Stack
     from rosglass.rviz.window import Window
 
 __all__ = [
@@ -199,11 +198,21 @@ class Input(QtCore.QObject):  # type: ignore[misc]
     It offers an event to the overlays from the top, popups first. The overlay that accepts a press
     grabs the mouse until all buttons are released, and gets the keyboard focus. RViz gets events
     that no overlay accepts, unless a modal popup is shown.
+
+    Args:
+        window: RViz's window.
+        topmost_first: Returns the visible overlays, topmost first.
+        raise_popup: Raises a popup above all others; does nothing for other overlays.
     """
 
-    def __init__(self, window: Window, stack: Stack) -> None:
+    def __init__(
+        self,
+        window: Window,
+        topmost_first: Callable[[], list[Overlay]],
+        raise_popup: Callable[[Overlay], None],
+    ) -> None:
         super().__init__()
-        self._window, self._stack = window, stack
+        self._window, self._topmost_first, self._raise_popup = window, topmost_first, raise_popup
         self._panel = window.panel
         self._mouse_owner: Overlay | Owner | None = None
         self._touch_target: Overlay | None = None
@@ -231,7 +240,6 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         self._panel.setAcceptDrops(True)
         self._panel.installEventFilter(self)
         window.widget.installEventFilter(self)
-        stack.changed.connect(self._on_stack_changed)
         self._hover_timer = QtCore.QTimer()
         self._hover_timer.setInterval(_HOVER_CHECK_PERIOD_MS)
         self._hover_timer.timeout.connect(self._update_hover)
@@ -296,7 +304,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             return False
         route = self.routes.get(event.type())
         # Without visible overlays, RViz gets its events unchanged.
-        if route is None or not (self._mouse_owner or self._stack.topmost_first()):
+        if route is None or not (self._mouse_owner or self._topmost_first()):
             return False
         accepted = event.isAccepted()
         self._depth += 1
@@ -318,7 +326,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
 
     def _offer(self, event: Any) -> tuple[Overlay | None, bool]:
         """Return the overlay that accepts an event, or None and whether RViz may get it."""
-        for overlay in self._stack.topmost_first():
+        for overlay in self._topmost_first():
             if self._deliver(overlay, event):
                 return overlay, False
             if overlay.is_modal:
@@ -343,11 +351,11 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             self._end_capture()
         if self._mouse_owner is None:
             overlay, for_rviz = self._offer(event)
-            if overlay is not None and overlay not in self._stack.topmost_first():
+            if overlay is not None and overlay not in self._topmost_first():
                 self._mouse_owner = Owner.NONE
             elif overlay is not None:
                 self._mouse_owner = overlay
-                self._stack.raise_popup(overlay)
+                self._raise_popup(overlay)
                 self.focus(overlay)
             else:
                 self._mouse_owner = Owner.RVIZ if for_rviz else Owner.NONE
@@ -445,9 +453,9 @@ class Input(QtCore.QObject):  # type: ignore[misc]
     def _touch(self, event: Any) -> bool:
         if event.type() == _E.TouchBegin:
             overlay, for_rviz = self._offer(event)
-            self._touch_target = overlay if overlay in self._stack.topmost_first() else None
+            self._touch_target = overlay if overlay in self._topmost_first() else None
             if self._touch_target is not None:
-                self._stack.raise_popup(self._touch_target)
+                self._raise_popup(self._touch_target)
                 self.focus(self._touch_target)
             # Qt sends mouse events for a touch that is not accepted.
             return overlay is not None or not for_rviz
@@ -461,7 +469,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
 
     def _drag(self, event: Any) -> bool:
         before, over = self._drag_target, None
-        for overlay in [] if event.type() == _E.DragLeave else self._stack.topmost_first():
+        for overlay in [] if event.type() == _E.DragLeave else self._topmost_first():
             sent = scaled(event, 1 / overlay.scale)
             taken = False
             with guarded(overlay, "handling a drag"):
@@ -483,7 +491,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
     def _key(self, event: Any) -> bool:
         focused = self._focused
         if focused is None:
-            return any(overlay.is_modal for overlay in self._stack.topmost_first())
+            return any(overlay.is_modal for overlay in self._topmost_first())
         if self._deliver(focused, event):
             return True
         if event.type() == _E.KeyPress and event.key() == QtCore.Qt.Key_Escape:
@@ -516,8 +524,9 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             self._leave(touched)
         self.hover(None)
 
-    def _on_stack_changed(self) -> None:
-        shown = self._stack.topmost_first()
+    def on_stack_changed(self) -> None:
+        """Drop what belongs to overlays that are not shown any more."""
+        shown = self._topmost_first()
         for which in (self._mouse_owner, self._touch_target, self._hovered, self._focused):
             if which is not None and not isinstance(which, Owner) and which not in shown:
                 self.forget(which)

@@ -87,7 +87,8 @@ class Stack(QtCore.QObject):
         self._cleaner = MemoryCleaner()
         window.before_frame.connect(self._before_frame)
         #: Routes mouse, touch and keyboard events.
-        self.input = Input(window, self)
+        self.input = Input(window, self.topmost_first, self.raise_popup)
+        self.changed.connect(self.input.on_stack_changed)
 
     def add(self, overlay: Overlay) -> None:
         """Show an overlay above those of lower or equal `z`.

@@ -12,7 +12,7 @@ from rosglass.comm.statistics import Pace, note_time, rate_of
 from rosglass.comm.time import Time
 from rosglass.images import ImageStream
 from rosglass.qml.elements.image_rendering import Look, Picture, Renderer
-from rosglass.qml.elements.image_subscription import LoadBalancer
+from rosglass.qml.elements.load_balancer import LoadBalancer
 from rosglass.qt import QtCore, is_alive
 
 if TYPE_CHECKING:

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.scene.displays.display import Display
     from rosglass.scene.displays.scene import Scene
+    from rosglass.scene.displays.scene_frames import SceneFrames
     from rosglass.scene.render.camera import Camera
     from rosglass.scene.render.renderer import Frame
     from rosglass.scene.render.scene_tree import Item
@@ -128,6 +129,9 @@ class CameraDisplay(PictureDisplay):
     hiddenDisplays = Writable(list, [], then="_on_hidden")
 
     isCamera = Property(bool, lambda _: True, constant=True)
+
+    if TYPE_CHECKING:
+        scene: Scene | None
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -283,7 +287,7 @@ class CameraDisplay(PictureDisplay):
             self.pictureChanged.emit()
         self.on_transforms()
 
-    def join(self, scene: Scene) -> None:
+    def join(self, scene: SceneFrames) -> None:
         """Start to be shown in a scene."""
         super().join(scene)
         self.pictureChanged.emit()

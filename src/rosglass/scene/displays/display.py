@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.displays.parts import Parts
-    from rosglass.scene.displays.scene import Scene
+    from rosglass.scene.displays.scene_frames import SceneFrames
 
 __all__ = ["LATE_S", "OUTDATED_ALPHA", "Display", "Status"]
 
@@ -116,7 +116,7 @@ class Display(Configurable, TopicElement):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self.root = Group()
-        self.scene: Scene | None = None
+        self.scene: SceneFrames | None = None
         #: True once it was removed and waits to be destroyed.
         self._is_removed = False
         self.status_lines: dict[str, Status] = {}
@@ -178,7 +178,7 @@ class Display(Configurable, TopicElement):
         else:
             self.delete_status("Publishers")
 
-    def join(self, scene: Scene) -> None:
+    def join(self, scene: SceneFrames) -> None:
         """Start to be shown in a scene; called by the scene."""
         self.scene, self._is_removed = scene, False
         self.root.visible = self.enabled

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from rosglass.messages import Message
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.scene.data.resource_retriever import ResourceRetriever
-    from rosglass.scene.displays.scene import Scene
+    from rosglass.scene.displays.scene_frames import SceneFrames
     from rosglass.scene.render.camera import Camera
     from rosglass.scene.tools.pointer_event import PointerEvent
 
@@ -225,7 +225,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
 
     # -- the view --------------------------------------------------------------------------------
 
-    def join(self, scene: Scene) -> None:
+    def join(self, scene: SceneFrames) -> None:
         """Start to be shown in a scene, and turn texts to its view."""
         super().join(scene)
         view: Any = scene.parent()

@@ -45,7 +45,6 @@ from rosglass.scene.view_controllers.events import Button, Modifier
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rosglass.scene.displays.interactive_marker import InteractiveMarkersDisplay
     from rosglass.scene.render.camera import Camera
     from rosglass.scene.tools.pointer_event import PointerEvent
 
@@ -438,7 +437,7 @@ class InteractiveMarker:
         stamp: The time at which its frame counts; 0 for always.
     """
 
-    def __init__(self, display: InteractiveMarkersDisplay, record: InteractiveMarkerRecord) -> None:
+    def __init__(self, display: Any, record: InteractiveMarkerRecord) -> None:
         self.display, self.record = display, record
         self.root = Group()
         self.root.visible = False
@@ -637,7 +636,7 @@ class InteractiveMarker:
         if is_last and event in _COMMANDS:
             what = f"{_COMMANDS[event]} {entry or control}".strip()
             command = f"{what} of marker {self.record.name}"
-        return self.display.publish(
+        sent: bool = self.display.publish(
             self,
             {
                 "header": {"frame_id": frame, "stamp": Time(stamp)},
@@ -654,6 +653,7 @@ class InteractiveMarker:
             },
             command,
         )
+        return sent
 
 
 # -- geometry --------------------------------------------------------------------------------------

@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.data.resource_retriever import ResourceRetriever
-    from rosglass.scene.displays.scene import Scene
+    from rosglass.scene.displays.scene_frames import SceneFrames
     from rosglass.scene.render.mesh_shapes import Shape
 
     Matrix: TypeAlias = NDArray[np.float64]
@@ -359,7 +359,7 @@ class _Poses:
         misses: How many lookups have failed.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: SceneFrames) -> None:
         self._scene = scene
         self._found: dict[tuple[str, int], NDArray[np.float64] | str] = {}
         self.misses = 0

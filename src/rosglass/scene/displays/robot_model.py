@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from rosglass.scene.data.resource_retriever import ResourceRetriever
     from rosglass.scene.data.triangles import MeshPart
     from rosglass.scene.data.urdf import Link, Visual
-    from rosglass.scene.displays.scene import Scene
+    from rosglass.scene.displays.scene_frames import SceneFrames
 
 __all__ = [
     "DescriptionLoader",
@@ -152,10 +152,10 @@ class DescriptionLoader:
     ) -> None:
         self._read, self._on_read, self._on_progress = read, on_read, on_progress
         #: The scene that is reading one.
-        self._busy: Scene | None = None
+        self._busy: SceneFrames | None = None
         self._next: tuple[str, str] | None = None
 
-    def load(self, scene: Scene, text: str, source: str) -> None:
+    def load(self, scene: SceneFrames, text: str, source: str) -> None:
         """Read a description from a source, for errors."""
         if self._busy is scene:
             self._next = (text, source)
@@ -174,7 +174,7 @@ class DescriptionLoader:
             lambda result: self._on_loaded(scene, text, result),
         )
 
-    def _on_loaded(self, scene: Scene, text: str, result: Any) -> None:
+    def _on_loaded(self, scene: SceneFrames, text: str, result: Any) -> None:
         self._busy = None
         following, self._next = self._next, None
         self._on_read(text, result)

@@ -12,7 +12,6 @@ from rosglass.scene.access import access_of
 
 if TYPE_CHECKING:
     from rosglass.scene.access import SceneAccess
-    from rosglass.scene.overlays.view_controller import ViewControllerDisplay
     from rosglass.scene.view.scene_view import SceneView
 
 __all__ = ["ViewControl", "control_of"]
@@ -45,7 +44,7 @@ class ViewControl(QtCore.QObject):
         self._access = access
         #: The camera.
         self.view = access.view
-        self._displays: list[ViewControllerDisplay] = []
+        self._displays: list[Any] = []
         #: The parts to close.
         self._parts: list[ViewKeys | ViewServices] = []
         #: The topics and services; None while there is no display.
@@ -62,7 +61,7 @@ class ViewControl(QtCore.QObject):
         parts = self._parts
         self.destroyed.connect(lambda *_: _close(parts))
 
-    def add(self, display: ViewControllerDisplay) -> None:
+    def add(self, display: Any) -> None:
         """Begin with the first display, whose settings count; others show the same."""
         first = not self._displays
         self._displays.append(display)
@@ -88,14 +87,14 @@ class ViewControl(QtCore.QObject):
             self._show_frame()
         self._show()
 
-    def remove(self, display: ViewControllerDisplay) -> None:
+    def remove(self, display: Any) -> None:
         """End when no display is left, unless another one is added at once."""
         if display in self._displays:
             self._displays.remove(display)
             if not self._displays and is_alive(self):
                 self._end.start()
 
-    def take_settings(self, display: ViewControllerDisplay) -> None:
+    def take_settings(self, display: Any) -> None:
         """Apply the settings that the user, or QML, has changed in a display."""
         if not self._shows:
             for name, setting in _SETTINGS.items():

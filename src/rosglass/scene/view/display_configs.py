@@ -94,6 +94,9 @@ class GroupDisplay(Display):
 
     TYPE = "Group"
 
+    if TYPE_CHECKING:
+        scene: Scene | None
+
     def on_group_enabled(self) -> None:
         """Show or hide what is in it, as it or its own group is shown or hidden."""
         super().on_group_enabled()
