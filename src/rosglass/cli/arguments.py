@@ -104,8 +104,8 @@ def _add_overlays(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.qml",
         action="append",
         default=[],
-        help="an interface over the 3D view; package://name/path for a file in a package; may be "
-        "repeated, the last one is uppermost",
+        help="a QML file to show over the 3D view; package://name/path for a file in a package; "
+        "may be repeated, the last one is on top",
     )
     complete(overlay, "*.qml")
     parser.add_argument(
@@ -131,22 +131,22 @@ def _add_interface_options(
         "--renderer",
         choices=("auto", "opengl", "software"),
         default="auto",
-        help=f"what draws {drawn}: OpenGL, Qt's software renderer (no shaders, particles and "
-        "videos), or the faster one (auto, the default)",
+        help=f"renderer of {drawn}: OpenGL, Qt's software renderer (no shaders, particles or "
+        "videos), or the faster one of these (auto, the default)",
     )
     parser.add_argument(
         "--allow-network",
         action="store_true",
-        help="let the interface load images, QML files, modules and meshes from other machines "
-        "(http:)",
+        help="allow the interface to load images, QML files, modules and meshes from other "
+        "machines (http:)",
     )
     parser.add_argument(
         "--longest-script",
         metavar="SECONDS",
         type=seconds,
         default=5.0,
-        help="how long JavaScript may run at a time before it is interrupted, because it blocks "
-        "the interface; 0 for no limit (default: %(default)g)",
+        help="interrupt JavaScript that has blocked the interface for this long; 0 for no limit "
+        "(default: %(default)g)",
     )
     parser.add_argument(
         "--screenshot",
@@ -159,7 +159,7 @@ def _add_interface_options(
         metavar="SECONDS",
         type=_time_within_a_day,
         default=after,
-        help="when to take the screenshot (default: %(default)s)",
+        help="time until the screenshot (default: %(default)s)",
     )
     add_definitions_option(parser)
 
@@ -311,8 +311,8 @@ def _qml_path(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--qmlls-ini",
         action="store_true",
-        help="write .qmlls.ini in this folder, which configures the QML language server of an "
-        "editor; other settings in it are kept",
+        help="write .qmlls.ini in the current folder, to configure an editor's QML language "
+        "server; other settings in the file are kept",
     )
 
 
@@ -320,28 +320,28 @@ def _demo(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--url",
         default=os.environ.get("ROSGLASS_URL") or _DEMO_URL,
-        help="dds://, or a Zenoh router, which is started if none answers "
+        help="dds://, or the URL of a Zenoh router; starts one if none answers "
         f"(default: {_shown(os.environ.get('ROSGLASS_URL') or _DEMO_URL)})",
     )
     parser.add_argument(
-        "--no-robot", action="store_true", help="use a robot that is running already"
+        "--no-robot", action="store_true", help="use a robot that is already running"
     )
     parser.add_argument(
         "--seconds",
         type=float,
         metavar="N",
-        help="exit after N seconds (default: when the window is closed; without display 20)",
+        help="exit after N seconds (default: when the window is closed; without a display: 20)",
     )
     parser.add_argument(
         "--screenshot",
         metavar="FILE.png",
         type=screenshot_file,
-        help="save a screenshot before the end (without display: demo.png)",
+        help="save a screenshot before the end (default without a display: demo.png)",
     )
     parser.add_argument(
         "--headless",
         action="store_true",
-        help="use a virtual screen and drive automatically, as on a machine without display",
+        help="use a virtual screen and drive automatically, as on a machine without a display",
     )
 
 
@@ -365,7 +365,7 @@ def _robot(parser: argparse.ArgumentParser) -> None:
         "--url",
         default=_robot_url(),
         help="URL of the graph (default: ROSGLASS_URL, or the ROS 1 master that "
-        f"ROS_MASTER_URI names, or zenoh://127.0.0.1:7447; here: {_shown(_robot_url())})",
+        f"ROS_MASTER_URI names, or zenoh://127.0.0.1:7447; now: {_shown(_robot_url())})",
     )
     parser.add_argument("--name", default="robot", help="name of the node (default: %(default)s)")
     parser.add_argument(
@@ -376,7 +376,11 @@ def _robot(parser: argparse.ArgumentParser) -> None:
         "--no-compressed", action="store_true", help="publish no compressed camera images"
     )
     parser.add_argument(
-        "--jpeg-quality", type=int, default=80, metavar="1-100", help="default: %(default)s"
+        "--jpeg-quality",
+        type=int,
+        default=80,
+        metavar="1-100",
+        help="quality of compressed images (default: %(default)s)",
     )
     parser.add_argument(
         "--equipped",
@@ -388,13 +392,12 @@ def _robot(parser: argparse.ArgumentParser) -> None:
         "--mode",
         default="supervised",
         metavar="MODE",
-        help="first mode of an equipped robot: autonomous, supervised or safe "
-        "(default: %(default)s)",
+        help="initial mode with --equipped: autonomous, supervised or safe (default: %(default)s)",
     )
     parser.add_argument(
         "--leash",
         action="store_true",
-        help="exit when standard input closes, that is, with the program that started the robot",
+        help="exit when standard input closes, so together with the program that started the robot",
     )
     parser.set_defaults(ros_arguments=[])
 
@@ -460,7 +463,14 @@ def _topic(parser: argparse.ArgumentParser) -> None:
     sub = add("pub", "publish messages on a topic", "publish")
     _add_name(sub, "topic", "topics")
     _add_values(sub, "values as YAML: '{data: hello}'", "messages")
-    sub.add_argument("-r", "--rate", type=_rate, default=1.0, metavar="HZ", help="default: 1")
+    sub.add_argument(
+        "-r",
+        "--rate",
+        type=_rate,
+        default=1.0,
+        metavar="HZ",
+        help="messages per second (default: %(default)g)",
+    )
     _add_count(sub, "publish")
     sub.add_argument(
         "-w",
@@ -472,7 +482,7 @@ def _topic(parser: argparse.ArgumentParser) -> None:
     )
     sub.add_argument(
         "--keep-alive", type=seconds, default=0.5, metavar="SECONDS",
-        help="wait after the last message for its delivery (default: %(default)g)",
+        help="time to wait for delivery after the last message (default: %(default)g)",
     )  # fmt: skip
     _add_qos(sub, "default")
     _add_common(sub)
@@ -480,7 +490,9 @@ def _topic(parser: argparse.ArgumentParser) -> None:
 
 def _add_topic_and_type(parser: argparse.ArgumentParser) -> None:
     _add_name(parser, "topic", "topics")
-    _add_name(parser, "type", "messages", nargs="?", help="its type (default: the published one)")
+    _add_name(
+        parser, "type", "messages", nargs="?", help="message type (default: the published one)"
+    )
 
 
 def _add_count(parser: argparse.ArgumentParser, verb: str) -> None:
@@ -517,7 +529,7 @@ def _add_qos(parser: argparse.ArgumentParser, default: str) -> None:
         ("durability", ("volatile", "transient_local")),
         ("history", ("keep_last", "keep_all")),
     ):
-        group.add_argument(f"--qos-{policy}", choices=words, help="overrides the profile")
+        group.add_argument(f"--qos-{policy}", choices=words, help="override the profile")
 
 
 def _service(parser: argparse.ArgumentParser) -> None:
@@ -546,20 +558,20 @@ def _lifecycle(parser: argparse.ArgumentParser) -> None:
         "-a", "--all", "--include-hidden-nodes", action="store_true", help="include hidden nodes"
     )
     sub.add_argument(
-        "-c", "--count", "--count-nodes", action="store_true", help="print their number"
+        "-c", "--count", "--count-nodes", action="store_true", help="print the number of nodes"
     )
     _add_common(sub)
     sub = add("get", "print the state of a lifecycle node, or of all", "get")
     _add_name(sub, "node", "lifecycle_nodes", nargs="?", default="")
     _add_common(sub)
-    sub = add("list", "list the transitions that are possible now", "list_transitions")
+    sub = add("list", "list the transitions from a node's current state", "list_transitions")
     _add_name(sub, "node", "lifecycle_nodes")
     sub.add_argument("-a", "--all", action="store_true", help="list the transitions of all states")
     _add_common(sub)
-    sub = add("set", "make a transition, and wait for its end", "set_state")
+    sub = add("set", "request a transition, and wait until it is done", "set_state")
     _add_name(sub, "node", "lifecycle_nodes")
     sub.add_argument(
-        "transition", help="its name or number, e.g. configure, activate, deactivate, shutdown"
+        "transition", help="name or number, e.g. configure, activate, deactivate, shutdown"
     )
     _add_common(sub, timeout=30.0)
 
@@ -572,7 +584,7 @@ def _action(parser: argparse.ArgumentParser) -> None:
     sub = add("info", "show the servers and clients of an action", "info")
     _add_name(sub, "action", "actions")
     _add_common(sub)
-    summary = "send a goal and wait for its end; Ctrl-C cancels it"
+    summary = "send a goal and wait for its result; Ctrl-C cancels it"
     sub = add("send", summary, "send", aliases=("send_goal",))
     _add_name(sub, "action", "actions")
     _add_values(sub, "goal as YAML: '{order: 5}'", "action_types")
@@ -582,8 +594,8 @@ def _action(parser: argparse.ArgumentParser) -> None:
 
 def _param(parser: argparse.ArgumentParser) -> None:
     parser.epilog = (
-        "In ROS 1, one server has all parameters: a name such as /robot/speed is accepted for NODE "
-        "and PARAMETER, and any namespace for NODE."
+        "ROS 1 keeps all parameters on one server: NODE may be any namespace, and a name such as "
+        "/robot/speed stands for NODE and PARAMETER."
     )
 
     def add(name: str, summary: str, **node: Any) -> argparse.ArgumentParser:
@@ -609,17 +621,17 @@ def _param(parser: argparse.ArgumentParser) -> None:
         sub.add_argument(
             "parameter",
             nargs="?",
-            help="name of the parameter, e.g. exposure; in ROS 1 also part of the node argument",
+            help="name of the parameter, e.g. exposure; in ROS 1 the node argument may contain it",
         )
         if name == "set":
-            sub.add_argument("value", nargs="?", help="as in YAML: 1.5, true, hello, [1, 2]")
+            sub.add_argument("value", nargs="?", help="value as YAML: 1.5, true, hello, [1, 2]")
         _add_common(sub)
     summary = "print all parameters of a node as a parameter file"
-    sub = add("dump", summary, nargs="?", help="name of the node; in ROS 1 optional: all")
+    sub = add("dump", summary, nargs="?", help="name of the node; optional in ROS 1: all")
     sub.add_argument("-o", "--output", metavar="FILE", help="write to a file")
     _add_common(sub)
     summary = "set the parameters of a node from a file"
-    sub = add("load", summary, help="name of the node; in ROS 1 optional, also after the file")
+    sub = add("load", summary, help="name of the node; in ROS 1 optional, or after the file")
     sub.add_argument("file", metavar="FILE.yaml", nargs="?", help="a parameter file")
     _add_common(sub)
 
@@ -664,12 +676,14 @@ def _interface(parser: argparse.ArgumentParser) -> None:
         "--template", action="store_true", help="print a message with all defaults, as YAML"
     )
     sub.add_argument(
-        "--ros1", action="store_true", help="the ROS 1 type; implied by --url ros1://..."
+        "--ros1", action="store_true", help="show the ROS 1 type; implied by --url ros1://..."
     )
     _add_common(sub, timeout=5.0)
     sub = add("list", "list the types available on this machine", "list_types")
-    sub.add_argument("text", nargs="?", default="", help="only names that contain this text")
-    sub.add_argument("--kind", choices=("msg", "srv", "action"), help="only this kind")
+    sub.add_argument("text", nargs="?", default="", help="list only names that contain this text")
+    sub.add_argument(
+        "--kind", choices=("msg", "srv", "action"), help="list only types of this kind"
+    )
     sub.add_argument("--ros1", action="store_true", help="list ROS 1 types")
     add_definitions_option(sub)
     add_output_options(sub)
@@ -710,7 +724,7 @@ def _record(parser: argparse.ArgumentParser) -> None:
         "--compression",
         choices=("zstd", "lz4", "bz2", "none"),
         default="",
-        help="compression of the file (default: zstd; .bag: none, lz4 or bz2, default none)",
+        help="compression of the file (default: zstd; for .bag none, lz4 or bz2, default: none)",
     )
     parser.add_argument("-q", "--quiet", action="store_true", help="show no progress")
     add_connection_options(parser)
@@ -722,9 +736,13 @@ def _play(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--list", action="store_true", help="list the contents of the recording and exit"
     )
-    parser.add_argument("--json", action="store_true", help="with --list: as JSON")
+    parser.add_argument("--json", action="store_true", help="with --list: print JSON")
     parser.add_argument(
-        "-r", "--rate", type=float, default=1.0, help="2 is twice as fast (default: %(default)g)"
+        "-r",
+        "--rate",
+        type=float,
+        default=1.0,
+        help="speed, 2 is twice as fast (default: %(default)g)",
     )
     parser.add_argument("-l", "--loop", action="store_true", help="start over at the end")
     parser.add_argument(
@@ -737,7 +755,7 @@ def _play(parser: argparse.ArgumentParser) -> None:
         help="publish /clock, for nodes with use_sim_time (default rate: 40 Hz)",
     )
     parser.add_argument(
-        "-t", "--topics", nargs="+", default=[], metavar="TOPIC", help="play only these"
+        "-t", "--topics", nargs="+", default=[], metavar="TOPIC", help="play only these topics"
     )
     _add_exclude(parser, "topics")
     parser.add_argument(
@@ -754,7 +772,7 @@ def _play(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=0.0,
         metavar="SECONDS",
-        help="start at this time in the recording",
+        help="start this long after the beginning of the recording",
     )
     parser.add_argument(
         "--duration", "--playback-duration", type=seconds, metavar="SECONDS",
@@ -790,8 +808,8 @@ def _bridge(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME",
         help="relay a topic in both directions; NAME:=OTHER renames it in the second graph, "
-        "'NAME->' relays it only from the first to the second, 'NAME<-' only back; * matches "
-        "any characters; may be repeated",
+        "'NAME->' relays it only from the first to the second, 'NAME<-' only from the second to "
+        "the first; * matches any characters; may be repeated",
     )
     parser.add_argument(
         "-s",
@@ -799,7 +817,7 @@ def _bridge(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="the same for a service; 'NAME->' is one offered in the first graph",
+        help="the same for a service; 'NAME->' is a service offered in the first graph",
     )
     parser.add_argument(
         "--action",
@@ -812,8 +830,7 @@ def _bridge(parser: argparse.ArgumentParser) -> None:
         "-a",
         "--all",
         action="store_true",
-        help="relay all topics, services and actions, except hidden ones and those that every "
-        "node has",
+        help="relay all topics, services and actions, except hidden and built-in ones",
     )
     _add_exclude(parser, "names")
     parser.add_argument(
@@ -827,7 +844,7 @@ def _bridge(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=pair("/topic:=package/Type"),
         metavar="NAME:=TYPE",
-        help="the type of a topic without publishers yet: it is relayed from its first message",
+        help="the type of a topic that has no publisher yet, to relay its first message as well",
     )
     parser.add_argument(
         "--qos",
@@ -845,7 +862,7 @@ def _bridge(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=10.0,
         metavar="SECONDS",
-        help="time for servers to respond (default: %(default)g)",
+        help="time that servers have to respond (default: %(default)g)",
     )
     parser.add_argument(
         "--list",
@@ -876,7 +893,8 @@ def _bridge(parser: argparse.ArgumentParser) -> None:
     add_definitions_option(parser)
     add_output_options(parser)
     parser.epilog = (
-        "Ctrl-C ends it. The mapping of types, and what is lost: docs/bridge.md in the source."
+        "Ctrl-C ends the bridge. docs/bridge.md in the source lists how types are mapped, and what "
+        "is lost."
     )
 
 
@@ -897,8 +915,8 @@ def _router(parser: argparse.ArgumentParser) -> None:
     where.add_argument(
         "--listen",
         metavar="tcp/HOST:PORT",
-        help="endpoint to listen on, or tls/HOST:PORT (default: that of the configuration, or "
-        "tcp/127.0.0.1:7447, this machine only; port 0: a free one)",
+        help="endpoint to listen on, or tls/HOST:PORT; port 0 selects a free one (default: from "
+        "the configuration, or tcp/127.0.0.1:7447, this machine only)",
     )
     where.add_argument(
         "--open",
@@ -910,7 +928,7 @@ def _router(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--config",
         metavar="FILE",
-        help="Zenoh configuration (JSON5), as rmw_zenoh has it: users, TLS, access control "
+        help="Zenoh configuration (JSON5), as for rmw_zenohd: users, TLS, access control "
         "(default: ZENOH_ROUTER_CONFIG_URI)",
     )
     parser.epilog = "docs/security.md in the source has a configuration with users and TLS."
@@ -939,7 +957,7 @@ def _completion(parser: argparse.ArgumentParser) -> None:
 COMMANDS = {
     "run": (_run, "open an interface written in QML"),
     "rviz": (_rviz, "open RViz with interfaces over its 3D view"),
-    "view": (_view, "open the robot's 3D view, as RViz does, without RViz"),
+    "view": (_view, "show the robot in a 3D view like RViz's, without RViz"),
     "qml-path": (_qml_path, "print the folders of the QML modules, for editors"),
     "demo": (_demo, "open the demo cockpit on a simulated robot"),
     "robot": (_robot, "run the simulated robot"),
@@ -948,13 +966,13 @@ COMMANDS = {
     "action": (_action, "inspect actions and send goals"),
     "param": (_param, "read and set the parameters of nodes"),
     "node": (_node, "inspect nodes"),
-    "lifecycle": (_lifecycle, "inspect lifecycle nodes, change their states"),
+    "lifecycle": (_lifecycle, "inspect lifecycle nodes and change their states"),
     "interface": (_interface, "show message, service and action types"),
     "record": (_record, "record topics to an MCAP file or a ROS 1 bag"),
     "play": (_play, "play a recording: MCAP, ROS 2 bag or ROS 1 bag"),
     "bridge": (_bridge, "relay topics, services and actions between two graphs"),
     "doctor": (_doctor, "find what blocks the connection to the robot"),
     "router": (_router, "run a Zenoh router for ROS 2 (rmw_zenoh)"),
-    "examples": (_examples, "copy the examples and the demo's cockpit, to start from"),
+    "examples": (_examples, "copy the examples and the demo's cockpit to a new folder"),
     "completion": (_completion, "print the shell code for Tab completion"),
 }

@@ -209,7 +209,7 @@ def add_connection_options(
         + (
             f"(default: {timeout:g})"
             if timeout is not None
-            else f"(default: {TIMEOUT_S:g}), and for each message (default: for ever)"
+            else f"(default: {TIMEOUT_S:g}), and for each message (default: no limit)"
         ),
     )
     parser.set_defaults(ros_arguments=[], looks_nearby=True)
