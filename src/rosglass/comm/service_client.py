@@ -46,7 +46,10 @@ _GRACE_S = 3.0
 class PendingCalls:
     """The calls of a client that have not ended, in their order; the only table of them.
 
-    A request waits in it until the requester takes it to send it.
+    A request waits in it until the requester takes it to send it. From any thread.
+
+    Attributes:
+        waiting: The number of requests that wait.
     """
 
     def __init__(self) -> None:
@@ -54,7 +57,7 @@ class PendingCalls:
         self._lock = threading.Lock()
         # Not a dict, whose first item is searched for behind all those that were removed.
         self._calls: OrderedDict[Call, PendingCall] = OrderedDict()
-        self._waiting = 0
+        self.waiting = 0
 
     def __len__(self) -> int:
         return len(self._calls)
@@ -72,20 +75,23 @@ class PendingCalls:
         with self._lock:
             self._calls[pending.call] = pending
 
+    def enqueue(self, pending: PendingCall) -> None:
+        """Queue a request for sending, in the order of the calls, unless its call has ended."""
+        with self._lock:
+            if pending.call in self._calls and not pending.waiting:
+                pending.waiting = True
+                self.waiting += 1
+
     def remove(self, pending: PendingCall) -> None:
         """Remove a call that has ended."""
         with self._lock:
             self._calls.pop(pending.call, None)
-            self._set_waiting(pending, False)
-
-    def enqueue(self, pending: PendingCall) -> None:
-        """Queue a request for sending, in the order of the calls, unless its call has ended."""
-        with self._lock:
-            self._set_waiting(pending, pending.call in self._calls)
+            self.waiting -= pending.waiting
+            pending.waiting = False
 
     def first(self) -> PendingCall | None:
         """Return the first request that waits; None if there is none."""
-        if self._waiting:
+        if self.waiting:
             with self._lock:
                 for pending in self._calls.values():
                     if pending.waiting:
@@ -95,12 +101,9 @@ class PendingCalls:
     def take(self, pending: PendingCall) -> bool:
         """Stop a request's wait, to send or to withdraw it; return whether it was waiting."""
         with self._lock:
-            return self._set_waiting(pending, False)
-
-    def _set_waiting(self, pending: PendingCall, waiting: bool) -> bool:
-        was, pending.waiting = pending.waiting, waiting
-        self._waiting += waiting - was
-        return was
+            waited, pending.waiting = pending.waiting, False
+            self.waiting -= waited
+        return waited
 
 
 class ServiceRequester(ABC):
@@ -330,8 +333,6 @@ class ServiceClient(Client):
         """
         timeout = check_timeout(timeout, self.name)
         pending = self._enter(request, timeout, private=False, server_only=server_only)
-        if timeout is not None:
-            pending.timer = self._core.timers.after(timeout, lambda: self._expire(pending))
         self._requester.send(pending)
         return pending.call
 
@@ -363,9 +364,11 @@ class ServiceClient(Client):
             server_only=server_only,
             private=private,
         )
+        if timeout is not None and not private:
+            pending.timer = self._core.timers.after(timeout, lambda: self._expire(pending))
         self._calls.add(pending)
         if self._closed:  # by another thread, which may have missed this call
-            self._calls.remove(pending)
+            self._on_end(pending)
             self._check_open()
         call.add_done_callback(lambda _: self._on_end(pending))
         return pending
@@ -387,8 +390,9 @@ class ServiceClient(Client):
     def _expire(self, pending: PendingCall) -> None:
         """End a call whose deadline has passed."""
         now = time.monotonic()
-        served = self._is_ready() or now - self._ready_at < _GRACE_S
-        if pending.call.done() or (pending.server_only and served):
+        if pending.call.done() or (
+            pending.server_only and (self._is_ready() or now - self._ready_at < _GRACE_S)
+        ):
             return
         timeout = 0.0 if pending.deadline is None else pending.deadline - pending.made
         error: Error

@@ -278,8 +278,7 @@ class Ros2Requester(ServiceRequester):
         except BaseException:
             self._flushing = False
             raise
-        waits = self._calls.first() is not None and not self._retrying
-        if waits and self._fitting(self._servers()):
+        if self._calls.waiting and not self._retrying and self._fitting(self._servers()):
             # The server is not linked yet, or holds requests: no event reports the change.
             self._retrying = True
             self._core.timers.after(_RETRY_S, self._retry)

@@ -150,7 +150,7 @@ class TcprosRequester(ServiceRequester):
         link, claimed = self._kept, False
         usable = link is not None and link.peer is not None and self._fits(link, pending.type)
         with self._lock:
-            if link is not None and usable and self._calls.first() is None:
+            if link is not None and usable and not self._calls.waiting:
                 taken = link.request is not None or link.settling or link.ended
                 if not taken and not pending.call.done() and link.has_nothing_to_read():
                     link.request, pending.route, claimed = pending, link, True
@@ -338,7 +338,7 @@ class TcprosRequester(ServiceRequester):
     @property
     def is_awaited(self) -> bool:
         """True while calls or threads wait for the server."""
-        return self._calls.first() is not None or (bool(self.waiters) and not self.ready())
+        return bool(self._calls.waiting or (self.waiters and not self.ready()))
 
     @property
     def has_connections(self) -> bool:
