@@ -714,7 +714,7 @@ def test_filters_do_not_take_long_whatever_the_names_are(robot: Robot) -> None:
     assert set(display.frames) == set(names[:3])
     text = display.status_lines["Filter (whitelist)"].text
     assert text == (
-        f"it takes too long with [{names[1]}] and 1 more, which it is not used for; write a "
+        f"it takes too long for [{names[1]}] and 1 more, to which it is not applied; write a "
         "simpler expression"
     )
     display.whitelist, display.blacklist = "", "^a|map"

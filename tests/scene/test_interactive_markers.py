@@ -406,12 +406,12 @@ def test_a_click_that_reaches_no_server_says_so(
     bench.session.shutdown()
     bench.wait(lambda: display.root.alpha < 1.0)
     hand.click(middle)
-    text = "button stop of marker arm: not sent, for the robot is not connected"
+    text = "button stop of marker arm: not sent: the robot is not connected"
     assert text in bench.view.statusText
     hand.click(middle, hand.RIGHT)
     open_menu(bench)
     display.selectMenuEntry(4)
-    assert "menu entry 4 of marker arm: not sent, for the robot" in bench.view.statusText
+    assert "menu entry 4 of marker arm: not sent: the robot" in bench.view.statusText
     assert len(server.events(BUTTON_CLICK)) == 1
 
 
@@ -640,7 +640,7 @@ def test_markers_fade_when_their_frame_is_not_updated(
     assert arm.root.alpha == 1.0
     bench.wait(lambda: arm.root.alpha < 1.0)
     assert goal.root.alpha == 1.0
-    assert "[gripper] may be somewhere else: no transform has come for" in display.statusText
+    assert "[gripper] may be somewhere else: no transform received for" in display.statusText
     bench.wait(lambda: move() or arm.root.alpha == 1.0)
 
 
@@ -930,7 +930,7 @@ def test_a_server_of_ros_1(ros1: tuple[SceneBench, RospyServer, RosMaster]) -> N
     assert "Server /marker_server: 2 markers" in display.statusText
     # Killed, it cannot say goodbye: its keep-alives are missed.
     server.kill()
-    bench.wait(lambda: "no sign of life" in display.statusText, lambda: display.statusText)
+    bench.wait(lambda: "no keep-alive" in display.statusText, lambda: display.statusText)
     assert display.stale
     other = RospyServer(master)
     bench.wait(lambda: display.markers == ["arm"], lambda: display.statusText)

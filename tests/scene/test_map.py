@@ -145,7 +145,7 @@ def test_an_update_changes_a_part(bench: SceneBench, show: Callable[..., Any]) -
 @pytest.mark.parametrize(
     ("message", "text"),
     [
-        (grid(20, 10, 0, width=30), "data: 200 cells, where 30 x 10 are 300"),
+        (grid(20, 10, 0, width=30), "data: 200 cells; expected 30 x 10 = 300"),
         (grid(20, 10, 0, width=0), "width 0, height 10: expected 1 to 16384 cells"),
         (grid(20, 10, 0, width=4_000_000_000), "width 4000000000"),
         (grid(20, 10, 0, resolution=float("nan")), "info.resolution: expected metres above 0"),

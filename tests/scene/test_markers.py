@@ -403,7 +403,7 @@ def test_locked_markers_fade_when_their_frame_is_not_updated(
     bench.wait(lambda: move() or display.statusLevel == "ok")
     # The others are where they were meant to be.
     bench.wait(lambda: opacities() == {1: 0.35, 2: 1.0, 3: 1.0}, opacities)
-    assert "[arm] may be somewhere else: no transform has come for" in display.statusText
+    assert "[arm] may be somewhere else: no transform received for" in display.statusText
     bench.wait(lambda: move() or opacities()[1] == 1.0)
     assert display.statusLevel == "ok", display.statusText
     bench.wait(lambda: opacities()[1] < 1.0)
@@ -715,7 +715,7 @@ def test_meshes_of_markers_that_were_missing_are_read_again(
         scene.ask_again_s = 0.1
         bench.wait(lambda: display.statusLevel == "error")
         text = display.status_lines["shapes/0"].text
-        assert "503 Service Unavailable; it is asked again later, by Reset at once" in text
+        assert "503 Service Unavailable; it is retried later, or at once by Reset" in text
         web.files["/flat.obj"] = triangle
         bench.wait(lambda: len(drawables(display)) == 1)
         bench.wait(lambda: display.statusLevel == "warn", lambda: display.statusText)

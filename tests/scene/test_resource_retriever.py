@@ -153,7 +153,7 @@ def test_servers_that_answer_later_are_asked_for_one_file_each(web: WebServer) -
     uris, retriever = [f"{web.url}{name}" for name in names], ResourceRetriever()
     refused = "http://127.0.0.1:1/d.stl"
     for uri in (*uris, refused):
-        with pytest.raises(ResourceError, match="it is asked again later, by Reset at once"):
+        with pytest.raises(ResourceError, match="it is retried later, or at once by Reset"):
             retriever.find(uri)
     with pytest.raises(ResourceError, match=r"404 Not Found$"):
         retriever.find(f"{web.url}/gone.stl")
@@ -211,7 +211,7 @@ def test_servers_that_do_not_answer_are_few(
         with pytest.raises(ResourceError, match="cannot be reached: timed out"):
             retriever.find(f"{web.url}/{number}.stl")
     before = len(web.requests)
-    with pytest.raises(ResourceError, match="it is not asked for: 3 servers have not answered"):
+    with pytest.raises(ResourceError, match="it is not requested: 3 servers have not answered"):
         retriever.find(f"{web.url}/good.stl")
     assert len(web.requests) == before
     # After the minute it is.

@@ -320,8 +320,8 @@ def test_a_web_server_that_was_down_is_asked_again(
         line = robot.status_lines["Mesh arm.stl"]
         assert line.level == "error"
         assert line.text == (
-            f"{web.url}/arm.stl: the server answers 503 Service Unavailable; it is asked again "
-            "later, by Reset at once"
+            f"{web.url}/arm.stl: the server answers 503 Service Unavailable; it is retried "
+            "later, or at once by Reset"
         )
         # Less and less often, and for one file only.
         assert view.scene.ask_again_s >= 0.4
@@ -458,7 +458,7 @@ def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any
     bench.wait(move)
     assert robot.root.alpha == 1.0
     bench.wait(lambda: robot.root.alpha < 1.0)
-    assert "[base_link] may be somewhere else: no transform has come for" in robot.statusText
+    assert "[base_link] may be somewhere else: no transform received for" in robot.statusText
     bench.wait(lambda: move() and robot.root.alpha == 1.0)
     assert robot.statusLevel == "ok", robot.statusText
 
@@ -485,7 +485,7 @@ def test_a_robot_fades_when_one_of_its_joints_is_not_updated(
     assert robot.root.alpha == 1.0
     # The odometry goes on without the node that publishes the joints.
     bench.wait(lambda: move(base) or robot.root.alpha < 1.0)
-    assert "[mast] may be somewhere else: no transform has come for" in robot.statusText
+    assert "[mast] may be somewhere else: no transform received for" in robot.statusText
     # One that is hidden is of no account.
     robot.setLinkEnabled("mast", False)
     bench.wait(lambda: move(base) or robot.root.alpha == 1.0)

@@ -477,7 +477,7 @@ def test_another_fixed_frame_drops_points_of_the_one_before(bench: SceneBench, h
     view.tool = "SetGoal"
     hand.press(hand.at((1, 0, 0)))
     view.fixedFrame = "odom"
-    assert view.statusText == "2D Goal Pose: dropped, for there is another fixed frame"
+    assert view.statusText == "2D Goal Pose: dropped: the fixed frame has changed"
     hand.release(hand.at((1, 0, 0)))
     bench.wait.settled(bench.session)
     assert goals == []
@@ -540,7 +540,7 @@ def test_a_goal_while_disconnected_is_not_sent(bench: SceneBench, hand: Hand) ->
     bench.session.shutdown()
     bench.wait(lambda: endpoint_of(goal) is None)
     hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
-    assert "not sent, for the robot is not connected" in view.statusText
+    assert "not sent: the robot is not connected" in view.statusText
     assert "not connected" in goal.problem
 
 
@@ -651,7 +651,7 @@ def test_escape_drops_a_goal_that_waits_for_its_server(
     hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
     assert "looking for a server" in view.statusText
     hand.key(hand.keys.Key_Escape)
-    assert "not sent, for it was dropped" in view.statusText
+    assert "not sent: it was dropped" in view.statusText
     driver = Driver(nav2)
     bench.wait(lambda: endpoint_of(goal).ready)
     bench.wait.settled(bench.session)
@@ -1279,7 +1279,7 @@ def test_a_goal_of_an_action_is_not_sent_while_disconnected(
         master.kill()
         bench.wait(lambda: bench.session.state != "connected")
         hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
-        assert "not sent, for the robot is not connected" in view.statusText
+        assert "not sent: the robot is not connected" in view.statusText
         assert view.tool == "Interact"
         master.start()
         bench.close()

@@ -853,7 +853,7 @@ def test_tool_tip_of_a_row_stands_beside_the_panel(bench: SceneBench, window: An
     QTest.mouseMove(window, rows.at("Fixed Frame", x=60))
 
     def tips(item: Any) -> list[Any]:
-        is_tip = item.property("text") == "The frame in which everything is placed."
+        is_tip = item.property("text") == "Frame in which everything is placed."
         below = [tip for one in item.childItems() for tip in tips(one)]
         return [item, *below] if is_tip and item.isVisible() else below
 

@@ -119,7 +119,7 @@ class _Constructors:
         for key, _ in node.value:
             if isinstance(key, load_pyyaml().ScalarNode):
                 if key.value in seen:
-                    raise _problem(key, f"{key.value!r} is there twice")
+                    raise _problem(key, f"{key.value!r} occurs twice")
                 seen.add(key.value)
         return self.construct_mapping(node, deep=True)
 

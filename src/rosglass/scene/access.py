@@ -775,13 +775,13 @@ class SceneDisplays(displays.Displays):
         return {
             f"{_OPTIONS}/Fixed Frame": _Property(
                 KINDS["frame"](),
-                "The frame in which everything is placed.",
+                "Frame in which everything is placed.",
                 lambda: scene.fixed_frame,
                 lambda frame: setattr(scene, "fixed_frame", frame),
             ),
             f"{_OPTIONS}/Background Color": _Property(
                 KINDS["color"](),
-                "What is behind everything.",
+                "Color of the background.",
                 lambda: view.property("background"),
                 lambda color: view.setProperty("background", color),
             ),

@@ -39,7 +39,7 @@ list: [1, 2.5, yes, null]
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("a: 1\na: 2", "f.yaml:2:1: .*'a' is there twice"),
+        ("a: 1\na: 2", "f.yaml:2:1: .*'a' occurs twice"),
         ("a: [", "f.yaml:1:"),
         ("a: *x", "undefined alias"),
         ("a: deg(x)", "f.yaml:1:4: .*'x' is not a number of degrees"),

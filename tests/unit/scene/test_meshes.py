@@ -346,14 +346,14 @@ def test_corners_share_vertices() -> None:
         ("<vcount>4", "<vcount>5", r"does not count the 4 corners"),
         ("<vcount>4", "<vcount>-4 8", r"does not count the 4 corners"),
         ("<vcount>4</vcount>", "", r"<polylist> has no <vcount>"),
-        ("<vcount>4", "<vcount>four", r"<vcount> has something else than numbers"),
+        ("<vcount>4", "<vcount>four", r"<vcount> contains something other than numbers"),
         ('count="4" stride="3"', 'count="5" stride="3"', r"more than the 12 numbers there are"),
         ('count="4" stride="3"', 'count="999999999999" stride="3"', r"more than the 12 numbers"),
         ('count="4" stride="3"', 'count="4" stride="0"', r"fewer than 3 for each vertex"),
         ('count="4" stride="3"', 'count="-1" stride="3"', r"more than the 12 numbers"),
         (SQUARE, "0 0 0 100 nan 0 100 100 0 0 100 0", r"vertex 1 is not finite: \[100.0, nan, 0"),
         (SQUARE, "0 0 0 1e40 0 0 100 100 0 0 100 0", r"vertex 1 is not finite: \[inf"),
-        (SQUARE, "0 0 0 1;5 0 0 100 100 0 0 100 0", r"<float_array> has something else"),
+        (SQUARE, "0 0 0 1;5 0 0 100 100 0 0 100 0", r"<float_array> contains something other"),
         ('url="#square"', 'url="#round"', r"url of <instance_geometry>: there is no '#round'"),
         ('url="#square"', 'url="other.dae#square"', r"there is no 'other.dae#square' in the file"),
         ('url="#scene"', 'url="#seen"', r"there is no '#seen'"),
@@ -402,7 +402,7 @@ def test_xml_that_rviz_reads_as_well(
     data = text.replace(old, new).encode("utf-8", "surrogateescape")
     assert corners(one(data, "a.dae")) == corners(one(text.encode(), "a.dae"))
     (record,) = caplog.records
-    assert re.fullmatch(rf"a\.dae:{fault}.*it is read all the same", record.getMessage(), re.DOTALL)
+    assert re.fullmatch(rf"a\.dae:{fault}.*it is read anyway", record.getMessage(), re.DOTALL)
 
 
 def test_many_comments_take_no_time() -> None:
@@ -550,7 +550,7 @@ def test_obj_without_its_materials(caplog: pytest.LogCaptureFixture) -> None:
         ("v 0 0 0\nf -2 -1 -1\n", r"an index of v that is not from 1 to 1"),
         ("v 0 0 0\nf 1/1 1/1 1/1\n", r"an index of vt that is not from 1 to 0"),
         ("v 0 0 0\nf 1//1 1//1 1//1\n", r"an index of vn that is not from 1 to 0"),
-        ("v 0 0 x\nf 1 1 1\n", r"a line that begins with v has something else than numbers"),
+        ("v 0 0 x\nf 1 1 1\n", r"a line that begins with v contains something other than numbers"),
         ("v 0 0 nan\nf 1 1 1\n", r"vertex 0 is not finite"),
         ("v 0 0 0\nf 1/x 1/x 1/x\n", r"a face is not of the form"),
         ("v 0 0 0\nf a b c\n", r"a face is not of the form .*'a b c'"),
@@ -717,7 +717,7 @@ def test_a_format_that_needs_what_is_missing(monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.parametrize("name", ["a.fbx", "a", "a.dae.zip", "a.mesh"])
 def test_unknown_formats(name: str) -> None:
-    with pytest.raises(UnsupportedError, match="is not a format that is read; convert"):
+    with pytest.raises(UnsupportedError, match="is not a supported format; convert"):
         load_mesh(b"data", name)
 
 

@@ -286,11 +286,11 @@ class DisplaysModel(QAbstractListModel):
             frames = tuple(scene.frames())
             yield PanelRow(
                 (*key, _FRAME_ROW), 1, _FRAME_ROW, "frame", scene.fixed_frame,
-                "The frame in which everything is placed.", choices=frames,
+                "Frame in which everything is placed.", choices=frames,
             )  # fmt: skip
             yield PanelRow(
                 (*key, _BACKGROUND), 1, _BACKGROUND, "color",
-                view.property("background").name(), "What is behind everything.",
+                view.property("background").name(), "Color of the background.",
             )  # fmt: skip
         problem, level = str(view.property("problem")), "error"
         session = scene._session

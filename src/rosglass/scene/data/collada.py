@@ -271,7 +271,7 @@ class _Collada:
         if element.tag == "triangles":
             if len(corners) % 3:
                 self._refuse(
-                    element, f"{len(corners)} corners of triangles; a multiple of 3 is due"
+                    element, f"{len(corners)} corners of triangles; expected a multiple of 3"
                 )
         elif element.tag == "polygons":
             counts = lengths
@@ -319,7 +319,7 @@ class _Collada:
         try:
             return np.fromstring(text, dtype, sep=" ")
         except (ValueError, DeprecationWarning):
-            self._refuse(element, f"<{element.tag}> has something else than numbers")
+            self._refuse(element, f"<{element.tag}> contains something other than numbers")
 
     # -- materials -----------------------------------------------------------------------------
 

@@ -209,7 +209,7 @@ def _reader(
     }
     if ending not in readers:
         raise UnsupportedError(
-            f"{name}: {ending or 'a name without ending'} is not a format that is read; convert "
+            f"{name}: {ending or 'a name without ending'} is not a supported format; convert "
             f"the mesh to one of {', '.join(readers)}"
         )
     return readers[ending]
@@ -344,7 +344,7 @@ def _read_stl(data: bytes, name: str, _base: str) -> list[MeshPart]:
     if len(data) < 84 or len(data) < size:
         raise MeshError(
             f"{name}: the STL file has {len(data)} bytes, too few for {count} triangles; it is cut "
-            "off or no STL file"
+            "off or not an STL file"
         )
     check_count(name, count)
     table = np.frombuffer(data, _STL, count, 84)
@@ -470,7 +470,7 @@ class _Obj:
                 values = np.array(padded).astype(np.float32)
         except (ValueError, DeprecationWarning):
             raise MeshError(
-                f"{self._name}: a line that begins with {key} has something else than numbers"
+                f"{self._name}: a line that begins with {key} contains something other than numbers"
             ) from None
         return np.ascontiguousarray(values.reshape(len(rows), -1)[:, :width])
 

@@ -56,7 +56,7 @@ _MAX_KEPT_BYTES = 64 << 20
 _MAX_CLIENTS = 8
 _CHUNK_BYTES = 1 << 16
 #: End of the reason where a server may answer later.
-_LATER = "; it is asked again later, by Reset at once"
+_LATER = "; it is retried later, or at once by Reset"
 
 
 class _Unanswered(Exception):  # noqa: N818 - never leaves this file
@@ -267,7 +267,7 @@ class ResourceRetriever:
             self._unanswered.popitem(last=False)
         if len(self._failures) == _MAX_FAILURES and now - self._failures[0] < _FAILURES_S:
             error = (
-                f"it is not asked for: {_MAX_FAILURES} servers have not answered within the last "
+                f"it is not requested: {_MAX_FAILURES} servers have not answered within the last "
                 f"{_FAILURES_S:g} s{_LATER}"
             )
             return _Outcome(self._failures[0] + _FAILURES_S, None, error)
@@ -332,9 +332,7 @@ class ResourceRetriever:
             if self._closed:
                 raise ResourceError("the view was closed")
             if time.monotonic() > deadline:
-                raise _Unanswered(
-                    f"{received} bytes have arrived within {_FETCH_TIMEOUT_S:g} s, and not all"
-                )
+                raise _Unanswered(f"only {received} bytes arrived within {_FETCH_TIMEOUT_S:g} s")
             chunks.append(chunk)
         if received < size:
             raise _Unanswered(f"the server sent {received} of {size} bytes")

@@ -69,7 +69,7 @@ def read_xml(
         if root is None:
             raise XmlError(later)
     if fault:
-        warn(f"{fault}; it is read all the same")
+        warn(f"{fault}; it is read anyway")
     return root
 
 

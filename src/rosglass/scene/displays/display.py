@@ -249,7 +249,7 @@ class Display(Configurable, TopicElement):
         worst = max(frames, key=lambda one: round(frames[one], 1))
         why = "the robot is not connected"
         if not math.isinf(frames[worst]):
-            why = f"no transform has come for {frames[worst]:.0f} s"
+            why = f"no transform received for {frames[worst]:.0f} s"
         more = f"[{worst}]" if len(frames) == 1 else f"[{worst}] and {len(frames) - 1} more"
         self.set_status("Frame", "warn", f"{more} may be somewhere else: {why}")
 

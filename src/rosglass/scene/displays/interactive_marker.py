@@ -401,13 +401,13 @@ class InteractiveMarkersDisplay(TopicDisplay):
         """Send a feedback; return why no server receives it, as far as is known."""
         connection, node, why = self._endpoint, self.node, self._disconnected()
         if connection is None or node is None:
-            return f"not sent, for {why or 'its topic is not advertised yet'}"
+            return f"not sent: {why or 'its topic is not advertised yet'}"
         feedback["client_id"] = f"{node.namespace.rstrip('/')}/{node.name}/{self.name}"
         try:
             count = connection.feedback.subscription_count()
             # In ROS 1, servers stay connected without the master.
             if why and not count:
-                return f"not sent, for {why}"
+                return f"not sent: {why}"
             connection.feedback.publish(feedback)
         except Error as error:
             return f"not sent: {error}"
@@ -418,7 +418,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
         if not why and self._outdated:
             why = "the server is gone"
         elif not why and servers and all(one.silent for one in servers):
-            why = f"the server has given no sign of life for more than {_KEEP_ALIVE_TIMEOUT_S:g} s"
+            why = f"the server has sent no keep-alive for more than {_KEEP_ALIVE_TIMEOUT_S:g} s"
         return f"sent on {topic}, but {why}" if why else ""
 
     def announce(self, text: str) -> None:
@@ -583,7 +583,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
     def _report(self, name: str, server: _Server) -> None:
         line = f"Server {name[:_MAX_NAME]}".strip()
         if server.silent:
-            text = f"no sign of life for more than {_KEEP_ALIVE_TIMEOUT_S:g} s"
+            text = f"no keep-alive for more than {_KEEP_ALIVE_TIMEOUT_S:g} s"
             self.set_status(line, "warn", f"{text}; its markers may be out of date")
         elif server.number is None:
             self.set_status(line, "warn", "waiting for its markers")

@@ -214,7 +214,7 @@ def _read_menu(entries: Any) -> tuple[list[dict[str, Any]], dict[int, str], str]
             problems.append(f"menu entry {entry.id}: its parent {entry.parent_id} is not above it")
             continue
         if entry.id in nodes:
-            problems.append(f"menu entry {entry.id} is there twice, or has the id 0")
+            problems.append(f"menu entry {entry.id} occurs twice, or has the id 0")
             continue
         depth = depths[entry.id] = depths[entry.parent_id] + 1
         if depth > _MAX_DEPTH:

@@ -96,7 +96,7 @@ def _cells_of(message: Any, width: int, height: int) -> NDArray[np.uint8]:
         raise Error(f"width {width}, height {height}: expected 1 to {_MAX_SIDE} cells")
     data = np.asarray(message.data)
     if len(data) != width * height:
-        raise Error(f"data: {len(data)} cells, where {width} x {height} are {width * height}")
+        raise Error(f"data: {len(data)} cells; expected {width} x {height} = {width * height}")
     return data.view(np.uint8).reshape(height, width)
 
 
@@ -216,7 +216,7 @@ class MapDisplay(TopicDisplay):
     def _fits(self, update: _Update) -> bool:
         """Return whether an update is within the map; the status says why it is not."""
         if self._cells is None:
-            self.set_status("Update", "warn", "an update came before the map; it is not used")
+            self.set_status("Update", "warn", "an update arrived before the map and is ignored")
             return False
         rows, columns = update.cells.shape
         x, y = update.x, update.y

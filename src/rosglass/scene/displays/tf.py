@@ -279,7 +279,7 @@ class TFDisplay(Display):
             names = self._undecided.get(path)
             if names:
                 more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-                text = f"it takes too long with [{names[0]}]{more}, which it is not used for"
+                text = f"it takes too long for [{names[0]}]{more}, to which it is not applied"
                 self.set_status(path, "warn", f"{text}; write a simpler expression")
             else:
                 self.delete_status(path)
@@ -332,7 +332,7 @@ class TFDisplay(Display):
     def _report_outdated(self, names: list[str]) -> None:
         if names:
             more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-            text = f"[{names[0]}]{more} may be somewhere else: no transform has come for a while"
+            text = f"[{names[0]}]{more} may be somewhere else: no transform received for a while"
             self.set_status("Updates", "warn", text)
         else:
             self.delete_status("Updates")

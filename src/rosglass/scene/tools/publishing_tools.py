@@ -169,7 +169,7 @@ class PublishingTool(Tool):
         sender, why = self._endpoint, self._disconnected()
         # In ROS 1, subscribers stay connected without the master.
         if why and (sender is None or not self._subscribers()):
-            self._complain(f"{text}: not sent, for {why}")
+            self._complain(f"{text}: not sent: {why}")
             return
         self._waiting = (fields, text, time.monotonic() + _MATCH_TIMEOUT_S)
         self._send_waiting()
@@ -223,7 +223,7 @@ class PublishingTool(Tool):
         """Drop a message that waits for a subscriber or a server; return whether there was one."""
         waiting, self._waiting = self._waiting, None
         if waiting is not None:
-            self.announce(f"{waiting[1]}: not sent, for it was dropped")
+            self.announce(f"{waiting[1]}: not sent: it was dropped")
         return waiting is not None
 
     def leave(self) -> None:
@@ -257,7 +257,7 @@ def _warn_of_goals(state: dict[str, Any], *_: Any) -> None:
     if waiting is not None:
         _log.warning("%s: not sent: the tool was destroyed", waiting[1])
     if state.get("_goalActive"):
-        text = "goal of %s: the tool was destroyed: its goal continues, and is reported no longer"
+        text = "goal of %s: the tool was destroyed: its goal continues without further reports"
         _log.warning(text, state.get("_action"))
 
 
@@ -471,9 +471,9 @@ class SetGoalTool(PoseTool):
             self._complain(f"goal of {self.action}: not canceled: {why}")
 
     def leave(self) -> None:
-        """Belong to no view any more; the robot keeps its goal, which is reported no longer."""
+        """Belong to no view any more; the robot keeps its goal, without further reports."""
         if self.goalActive:
-            text = "the tool was removed: its goal continues, and is reported no longer"
+            text = "the tool was removed: its goal continues without further reports"
             self._complain(f"goal of {self.action}: {text}")
             report(self, goalActive=False)
         super().leave()

@@ -480,7 +480,7 @@ class Tools(QtCore.QObject):
         tool = self._current
         if self._grab == "tool" and tool is not None:
             self._cancel()
-            self.announce(f"{tool.name}: dropped, for there is another fixed frame")
+            self.announce(f"{tool.name}: dropped: the fixed frame has changed")
         for one in list(self._items):
             self._call(one, one.on_fixed_frame)
 
