@@ -355,6 +355,24 @@ def test_several_goals_run_at_once(offer, client):
     assert goals[0].status.is_active
 
 
+class Failed(dict):
+    """A result whose own code fails."""
+
+    def items(self):
+        raise ZeroDivisionError("in the result")
+
+    __getitem__ = __iter__ = __len__ = keys = get = items
+
+
+def test_a_result_whose_own_code_fails_aborts_the_goal(offer, client, caplog):
+    done = Future()
+    offer(lambda goal: Failed() if goal.goal.order == 1 else done)
+    goals = [client.send_goal({"order": order}) for order in (1, 2)]
+    done.set_result(Failed())
+    assert [goal.result(30).status for goal in goals] == [GoalStatus.ABORTED] * 2
+    assert caplog.text.count("ZeroDivisionError: in the result") == 2
+
+
 def test_failing_callback_aborts_the_goal(offer, client, caplog):
     def fail(goal):
         if goal.goal.order == 1:

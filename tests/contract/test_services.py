@@ -384,6 +384,43 @@ def test_a_callback_that_fails_ends_the_call_with_an_error(offer, client, wire, 
     assert client.call(timeout=30).sum == 1
 
 
+class Failed(dict):
+    """A response whose own code fails."""
+
+    def items(self):
+        raise ZeroDivisionError("in the response")
+
+    __getitem__ = __iter__ = __len__ = keys = get = items
+
+
+def leave(_):
+    raise SystemExit("of the callback")
+
+
+def respond_later(_):
+    answer = Future()
+    answer.set_result(Failed())
+    return answer
+
+
+@pytest.mark.parametrize(
+    ("callback", "reason"),
+    [
+        (leave, "of the callback"),
+        (lambda _: Failed(), "in the response"),
+        (respond_later, "in the response"),
+    ],
+)
+def test_no_error_of_a_callback_or_response_leaves_the_client_waiting(
+    offer, client, wire, caplog, callback, reason
+):
+    offer(callback)
+    with refused(wire, reason):
+        client.call(timeout=patience(wire))
+    assert "the callback failed on a request of /console" in caplog.text
+    assert reason in caplog.text
+
+
 def test_a_service_error_of_a_callback_refuses_the_request(offer, client, wire, caplog):
     def refuse(_):
         raise rosglass.ServiceError("not homed")

@@ -7,6 +7,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from concurrent.futures import Future, wait
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
@@ -20,7 +21,7 @@ from rosglass.errors import ArgumentError, Error, NodeClosedError
 
 if TYPE_CHECKING:
     import logging
-    from collections.abc import Awaitable, Callable, Sequence
+    from collections.abc import Awaitable, Callable, Iterator, Sequence
 
     from rosglass.comm.core import NodeCore
     from rosglass.comm.handle import Executor
@@ -549,32 +550,31 @@ class ActionServer(Handle):
             goal._conclude(None)  # cancelled before its turn, unless it has ended
             self._protocol.on_returned()
             return
-        try:
+        with self._aborted_on_error(goal):
             result: Any = self._execute(goal)
-        except BaseException as error:  # noqa: BLE001 - sys.exit() in a user's callback ends the goal
-            self._on_failure(goal, error)
-            self._protocol.on_returned()
-            return
-        if inspect.iscoroutine(result) and isinstance(self._executor, LoopExecutor):
-            result = self._executor.run(result)
-        if isinstance(result, Future):
-            result.add_done_callback(lambda done: self._on_done(goal, done))
-            return
-        if inspect.iscoroutine(result):
-            result.close()
-            self._on_failure(goal, TypeError("execute must be an async def to be awaited"))
-        else:
+            if inspect.iscoroutine(result) and isinstance(self._executor, LoopExecutor):
+                result = self._executor.run(result)
+            if isinstance(result, Future):
+                result.add_done_callback(lambda done: self._on_done(goal, done))
+                return
+            if inspect.iscoroutine(result):
+                result.close()
+                raise TypeError("execute must be an async def to be awaited")
             self._on_result(goal, result)
         self._protocol.on_returned()
 
+    @contextmanager
+    def _aborted_on_error(self, goal: ServerGoal) -> Iterator[None]:
+        """Abort a goal after any error of a user's callback, coroutine or result."""
+        try:
+            yield
+        except BaseException as error:  # noqa: BLE001 - sys.exit() ends the goal, not the server
+            self._on_failure(goal, error)
+
     def _on_done(self, goal: ServerGoal, done: Future[Any]) -> None:
         """End a goal whose execution returned a future."""
-        try:
-            result = done.result(0)
-        except BaseException as error:  # noqa: BLE001 - as above, of a future
-            self._on_failure(goal, error)
-        else:
-            self._on_result(goal, result)
+        with self._aborted_on_error(goal):
+            self._on_result(goal, done.result(0))
         self._protocol.on_returned()
 
     def _on_result(self, goal: ServerGoal, result: Any) -> None:

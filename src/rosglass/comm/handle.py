@@ -86,7 +86,7 @@ def guarded(log: logging.Logger, text: str, *args: object) -> Iterator[None]:
     """
     try:
         yield
-    except BaseException as error:
+    except BaseException as error:  # sys.exit() must not end a thread that others need
         reraise_exit(error)
         log.exception(text, *args)
 

@@ -6,18 +6,19 @@ import inspect
 import logging
 import threading
 from collections import deque
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import Future
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rosglass.comm.executor import Dispatcher, LoopExecutor, executor_for
 from rosglass.comm.graph import EndpointKind
-from rosglass.comm.handle import Handle
+from rosglass.comm.handle import Handle, reraise_exit
 from rosglass.comm.log_limits import LogOnce
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.errors import DecodeError, Error, NodeClosedError, ServiceError
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Awaitable, Callable, Coroutine, Iterator
 
     from rosglass.comm.core import NodeCore
     from rosglass.comm.handle import Executor
@@ -163,27 +164,36 @@ class ServiceServer(Handle):
         except DecodeError as error:
             self._refuse(request, f"the request is not a {self.type.request.name}: {error}")
             return
-        try:
+        with self._failure_answered(request):
             answer = self._callback(message)
-        except Exception as error:  # noqa: BLE001 - a user's callback
+            if inspect.iscoroutine(answer):
+                answer = self._start(answer)
+            if isinstance(answer, Future):
+                answer.add_done_callback(lambda future: self._finish(request, future))
+            else:
+                self._respond(request, answer)
+
+    @contextmanager
+    def _failure_answered(self, request: RequestId) -> Iterator[None]:
+        """Answer a request with any error of a user's callback, coroutine or response."""
+        try:
+            yield
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - the client waits for an answer
             self._on_failure(request, error)
-            return
-        if inspect.iscoroutine(answer):
-            if not isinstance(self._executor, LoopExecutor):
-                answer.close()
-                misuse = TypeError("the callback must be an async def to be awaited")
-                self._on_failure(request, misuse)
-                return
-            answer = self._executor.run(answer)
-            with self._lock:
-                closed = self._closed
-                self._running.add(answer)
-            if closed:  # by another thread, after this one checked
-                answer.cancel()
-        if isinstance(answer, Future):
-            answer.add_done_callback(lambda future: self._finish(request, future))
-        else:
-            self._respond(request, answer)
+            reraise_exit(error)
+
+    def _start(self, coroutine: Coroutine[Any, Any, Any]) -> Future[Any]:
+        """Start a callback's coroutine."""
+        if not isinstance(self._executor, LoopExecutor):
+            coroutine.close()
+            raise TypeError("the callback must be an async def to be awaited")
+        answer = self._executor.run(coroutine)
+        with self._lock:
+            closed = self._closed
+            self._running.add(answer)
+        if closed:  # by another thread, after this one checked
+            answer.cancel()
+        return answer
 
     def _finish(self, request: RequestId, future: Future[Any]) -> None:
         """Answer a request whose callback returned a future."""
@@ -191,14 +201,11 @@ class ServiceServer(Handle):
             self._running.discard(future)
         if self._closed:
             return
-        try:
-            answer = future.result(0)
-        except CancelledError:
+        if future.cancelled():
             self._refuse(request, "the callback's future was cancelled")
-        except Exception as error:  # noqa: BLE001 - a user's coroutine
-            self._on_failure(request, error)
-        else:
-            self._respond(request, answer)
+            return
+        with self._failure_answered(request):
+            self._respond(request, future.result(0))
 
     def _respond(self, request: RequestId, answer: Any) -> None:
         """Send the callback's response."""
@@ -236,7 +243,7 @@ class ServiceServer(Handle):
             return "it gets a response with all defaults, as ROS 2 has no errors"
         return "it gets no response, and waits"
 
-    def _on_failure(self, request: RequestId, error: Exception) -> None:
+    def _on_failure(self, request: RequestId, error: BaseException) -> None:
         """Log that the callback failed, and report it to the client if the wire can."""
         client = self._replier.client_name(request)
         if isinstance(error, ServiceError) and self._replier.has_refusals:

@@ -349,7 +349,7 @@ class Replier(Handle):
         if instead is not None:
             self.reply(request, instead)
 
-    def describe_failure(self, error: Exception) -> str:
+    def describe_failure(self, error: BaseException) -> str:
         """Return the reason given to :meth:`fail` for an exception of the service's callback."""
         return f"{type(error).__name__}: {error}"
 

@@ -106,7 +106,7 @@ class TcprosReplier(Replier, Member):
         """Send the client the reason why there is no response."""
         _session_of(request).answer(False, reason.encode("utf-8", "replace"))
 
-    def describe_failure(self, error: Exception) -> str:
+    def describe_failure(self, error: BaseException) -> str:
         """Return rospy's text for an exception that the service's callback raised."""
         if isinstance(error, ServiceError):
             return f"service cannot process request: {error}"
