@@ -37,7 +37,7 @@ def main(argv: "Sequence[str] | None" = None) -> int:
         finally:
             if replaced:
                 signal.signal(signal.SIGINT, signal.default_int_handler)
-    except BaseException as error:
+    except BaseException as error:  # Ctrl-C may be the cause of any
         if isinstance(error, SystemExit) or not is_interrupt(error):
             raise
         import signal  # noqa: PLC0415

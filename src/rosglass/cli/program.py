@@ -92,7 +92,7 @@ def run(argv: Sequence[str] | None = None) -> int:
     try:
         code = _run(list(sys.argv[1:] if argv is None else argv))
         sys.stdout.flush()
-    except Exception as error:
+    except Exception as error:  # explained to the user, or Ctrl-C in C code
         if is_interrupt(error):
             raise KeyboardInterrupt from error
         return _explain(error)

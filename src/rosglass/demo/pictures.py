@@ -7,7 +7,6 @@ and provide a `source` for a QML ``Image``; cells and points never pass through 
 from __future__ import annotations
 
 import itertools
-import logging
 import math
 import time
 from abc import abstractmethod
@@ -19,6 +18,7 @@ import numpy as np
 from rosglass.comm import Dispatcher, QoS
 from rosglass.errors import Error
 from rosglass.qml.elements.element import TopicElement
+from rosglass.qml.engine.session import result_of
 from rosglass.qt import Property, QtCore, QtGui, QtQml, QtQuick, Signal, Slot
 
 if TYPE_CHECKING:
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["MapPicture", "ScanPicture", "paint_map", "paint_scan", "register"]
 
-_log = logging.getLogger("rosglass.demo")
 #: Largest number of cells of a map; a larger one is refused, as it would exhaust the memory.
 _MOST_CELLS = 100_000_000
 _numbers = itertools.count(1)
@@ -164,13 +163,7 @@ class _Picture(TopicElement):
         )
 
     def _on_message(self, message: Message) -> None:
-        try:
-            result: object = self.paint(message)
-        except Error as error:
-            result = error
-        except Exception as error:  # noqa: BLE001 - shown in place of the frame
-            _log.exception("%s: cannot be painted", self._topic)
-            result = Error(f"internal error: {error}")
+        result = result_of(lambda: self.paint(message), f"painting {self._topic}")
         with suppress(RuntimeError):  # the QML object was destroyed while its image was painted
             self._painted.emit(result)
 

@@ -18,7 +18,7 @@ from rosglass.comm.handle import guarded
 from rosglass.errors import ConnectionLostError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 __all__ = ["READ", "WRITE", "Acceptor", "IoLoop", "Later", "Ready", "listen"]
 
@@ -156,17 +156,15 @@ class IoLoop:
 
     def _work(self) -> None:
         while not self._closed or (self._lingering and time.monotonic() < self._deadline):
-            for key, events in self._selector.select(self._pause()):
+            for key, events in itertools.chain(self._selector.select(self._pause()), self._poll()):
                 handler = key.data
                 if handler is None:
                     self._on_wake()
                     continue
-                try:  # as in _run(), without its call: each message on a slow topic is an event
+                try:
                     handler.ready(events)
                 except BaseException as error:  # noqa: BLE001 - the other connections must go on
                     self._on_error(handler, error)
-            if self._polling:
-                self._poll()
             while self._later and self._later[0][0] <= time.monotonic():
                 job = heapq.heappop(self._later)[2].job
                 if job is not None:
@@ -175,13 +173,11 @@ class IoLoop:
                 self._run_job(self._jobs.popleft())
         self._finish()
 
-    def _poll(self) -> None:
-        """Poll the sockets that are not urgent, if it is time to."""
-        now = time.monotonic()
-        if now >= self._next_poll:
+    def _poll(self) -> Iterator[tuple[selectors.SelectorKey, int]]:
+        """Yield the events of the sockets that are not urgent, if it is time to poll them."""
+        if self._polling and (now := time.monotonic()) >= self._next_poll:
             self._next_poll = now + _IDLE_POLL_S
-            for key, events in self._polled.select(0):
-                self._run(key.data, events)
+            yield from self._polled.select(0)
 
     def _pause(self) -> float | None:
         """Return how long to wait for sockets, in seconds."""
@@ -218,12 +214,6 @@ class IoLoop:
             self._wake_out.recv(4096)
         # In this order: jobs of threads that see the old value run in this round.
         self._awake = False
-
-    def _run(self, handler: Ready, events: int) -> None:
-        try:
-            handler.ready(events)
-        except BaseException as error:  # noqa: BLE001 - the other connections must go on
-            self._on_error(handler, error)
 
     def _on_error(self, handler: Ready, error: BaseException) -> None:
         """Log an error and end the handler; no error may end this thread."""
