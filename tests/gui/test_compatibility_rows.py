@@ -189,7 +189,7 @@ TESTS = {
     "offscreen": "test_run.py::test_offscreen_without_any_display",
     "an engine without install()":
         "test_ros2.py::test_an_engine_that_was_not_prepared_says_what_to_do",
-    "demo cockpit": "test_demo_command.py::test_bad_options_are_explained",
+    "demo cockpit": "test_compatibility_rows.py::test_demo_needs_qt6",
     # Actions
     "`Ros2.createActionClient(name, type)`":
         "test_action_client.py::test_the_type_is_the_servers test_action_client.py::test_misuse_throws",
@@ -222,7 +222,8 @@ TESTS = {
     "`ActionGoalStatus`": "test_upstream_behaviour.py::test_enumerators_have_the_numbers_of_ros",
     "`Ros.createActionClient([ns,] type, name)`":
         "test_ros1_actions.py::test_names_within_a_namespace",
-    "`ActionClient.connected`, `connectedChanged`": "test_ros1_actions.py::test_the_interface_shuts_down",
+    "`ActionClient.connected`, `connectedChanged`":
+        "test_ros1_actions.py::test_connected_follows_the_server",
     "`ActionClient.actionType`": "test_ros1_actions.py::test_a_goal",
     "`isServerConnected()`": "test_ros1_actions.py::test_a_goal",
     "`sendGoal(goal, transition_cb, feedback_cb)`":
@@ -298,7 +299,7 @@ TESTS = {
     "`toolManager.toolClasses`": "helpers/overlay_contract.py::test_tools",
     "`QmlTool`: `isSelected`, `shortcutKey`, `name`, `description`, `classId`, `iconSource`":
         "helpers/overlay_contract.py::test_tools rviz/test_tools.py::test_tools_of_one_name",
-    "`QmlTool.accessAllKeys`, `tool`": "rviz/test_spelling.py::test_each_object_reports_misspelled_members",
+    "`QmlTool.accessAllKeys`, `tool`": "helpers/overlay_contract.py::test_tools",
     "`image://rviz_tool_icons/<classId>`": "helpers/overlay_contract.py::test_tool_icons",
     "`rviz.createPositionTracker(x, y, z)`, `position`, `positionChanged(position)`":
         "helpers/overlay_contract.py::test_position_trackers",
@@ -650,6 +651,15 @@ def test_qt5_refuses(bench: Any, imports: str, body: str, reason: str) -> None:
         return
     with pytest.raises(AssertionError, match=reason):
         bench.load(body, imports)
+
+
+@pytest.mark.both_qt
+@pytest.mark.skipif(not QT5, reason="it runs with Qt 6: see test_demo_command.py")
+def test_demo_needs_qt6(start: Any) -> None:
+    program = start("demo", "--seconds", "2")
+    assert program.end() == 1
+    assert "the demo's cockpit needs Qt 6" in program.text
+    assert "robot" not in program.text.replace("rosglass robot", "")
 
 
 @pytest.mark.both_qt

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosglass.demo.processes import DUPLICATE_EXIT, VirtualScreen, start_robot
-from rosglass.errors import Error
+from rosglass.errors import Error, UnsupportedError
+from rosglass.extras import install_command
 from rosglass.wires.zenoh.options import ZenohOptions, locator, shown_url
 
 if TYPE_CHECKING:
@@ -34,7 +35,13 @@ def run(args: argparse.Namespace) -> int:
     if not args.url.lower().startswith(("dds:", "zenoh:")):
         raise Error(f"--url {shown_url(args.url)}: expected dds:// or zenoh://HOST:PORT")
     # Checked before anything is started, so that nothing is left running.
-    import rosglass.qt  # noqa: F401, PLC0415
+    from rosglass.qt import QT6  # noqa: PLC0415
+
+    if not QT6:
+        raise UnsupportedError(
+            f"the demo's cockpit needs Qt 6: {install_command('qml')} (inside RViz's Python there "
+            "is Qt 5; use another virtual environment)"
+        )
 
     headless = args.headless or not _has_display()
     seconds = args.seconds
