@@ -63,6 +63,15 @@ def test_a_goal(actionlib: Client, counter: Counter, wait: Any) -> None:
     actionlib.run("handle.resend()")  # is logged
 
 
+def test_connected_follows_the_server(actionlib: Client, counter: Counter, wait: Any) -> None:
+    for changes in (1, 3):
+        counter.offer()
+        wait(lambda: actionlib.run("client.connected"))
+        assert actionlib.run("connections") == changes
+        counter.server.close()
+        wait(lambda: not actionlib.run("client.connected"))
+
+
 def test_names_within_a_namespace(live: Bench, counter: Counter, wait: Any) -> None:
     counter.offer()
     live.module = "Ros 1.0"

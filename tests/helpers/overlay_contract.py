@@ -302,6 +302,11 @@ def test_tools(over: Over) -> None:
         "image://rviz_tool_icons/rviz/MoveCamera",
     ]
     assert run("return rviz.toolManager.tools[0] === rviz.toolManager.tools[0]")
+    assert run(first + "return ['accessAllKeys', 'tool', 'name'].map(member => member in t)") == [
+        False,
+        False,
+        True,
+    ]
     run(first + "rviz.toolManager.currentTool = t")
     assert run("return rviz.toolManager.currentTool.classId") == "rviz/MoveCamera"
     assert run(first + "return t.isSelected")
