@@ -255,7 +255,7 @@ class Recorder(Handle):
         return chosen and bool(self._node.publishers(topic))
 
     def _find_similar(self, topic: str) -> str:
-        with suppress(NodeClosedError):
+        with suppress(NodeClosedError):  # then there is no hint
             known = [name for name in self._node.topics() if self._node.publishers(name)]
             return similar(topic, known)
         return ""

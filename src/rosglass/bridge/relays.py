@@ -516,7 +516,7 @@ class TopicRelay:
             made.close()
         if closed:
             return None
-        with suppress(NodeClosedError):
+        with suppress(NodeClosedError):  # another thread closed it
             made.on_matched(lambda _: self._wake(), IMMEDIATE)
         return kept
 
@@ -893,7 +893,7 @@ class ActionRelay(OfferedRelay[ActionClient, ActionServer, ActionType, ActionTra
         if goal.canceled:
             # The result may arrive before the response to the cancel request.
             received.wait_for_cancel(_ACCEPT_TIMEOUT_S)
-        with suppress(NodeClosedError):
+        with suppress(NodeClosedError):  # another thread closed it
             if status is GoalStatus.SUCCEEDED:
                 received.succeed(result)
             elif status is GoalStatus.CANCELED and received.is_cancel_requested:

@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _check_known(type_name: str) -> None:
     """Raise TypeNotFoundError if neither ROS's definition of a type is known here."""
-    with suppress(TypeNotFoundError):
+    with suppress(TypeNotFoundError):  # ROS 2's may be known
         load(type_name, 1)
         return
     load(type_name, 2)

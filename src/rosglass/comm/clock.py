@@ -207,7 +207,7 @@ class Clock(Unique):
 
     def forget(self, timer: Timer) -> None:
         """Remove a closed timer; called by :class:`Timer`."""
-        with self._changed, suppress(ValueError):
+        with self._changed, suppress(ValueError):  # closed twice
             self._periodic.remove(timer)
             self._set_alarm()
 
@@ -294,7 +294,7 @@ class _Watcher(Handle):
             self.listeners.notify(jump)
 
     def close(self) -> None:
-        with suppress(ValueError):
+        with suppress(ValueError):  # closed twice
             self._watchers.remove(self)
         self.listeners.clear()
 

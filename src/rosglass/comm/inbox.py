@@ -388,7 +388,7 @@ class Inbox:
 
     def remove_waiter(self, wake: Callable[[], object]) -> None:
         """Unregister a wake-up that was not called."""
-        with self._lock, suppress(ValueError):
+        with self._lock, suppress(ValueError):  # it is just being called
             self._waiters.remove(wake)
 
     def set_limit(self, limit: int) -> None:

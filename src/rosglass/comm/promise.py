@@ -113,12 +113,12 @@ class Promise(Future[_T]):
 
     def set_result(self, value: _T) -> None:
         """Complete it with `value`, unless it is already done."""
-        with suppress(InvalidStateError):
+        with suppress(InvalidStateError):  # as documented
             super().set_result(value)
 
     def set_exception(self, error: BaseException | None) -> None:
         """Complete it with an error, unless it is already done."""
-        with suppress(InvalidStateError):
+        with suppress(InvalidStateError):  # as documented
             super().set_exception(error)
 
     def _wait(self, timeout: float | None) -> None:

@@ -155,7 +155,7 @@ class VideoWriter:
         if not self._closed:
             self._closed = True
             if self._thread.is_alive():
-                with suppress(queue.Full):
+                with suppress(queue.Full):  # the thread is stuck, as is reported below
                     self._queue.put(-1.0 if time is None else time, timeout=_CLOSE_TIMEOUT_S)
                 self._thread.join(_CLOSE_TIMEOUT_S)
             if self._thread.is_alive():
@@ -249,7 +249,7 @@ def _find_encoder(suffix: str) -> tuple[str, dict[str, str]]:
             f"recording a video needs PyAV: {install_command('video')}"
         ) from None
     for name, options in _ENCODERS[suffix]:
-        with suppress(av.codec.codec.UnknownCodecError):
+        with suppress(av.codec.codec.UnknownCodecError):  # not in this build of FFmpeg
             av.codec.Codec(name, "w")
             return name, options
     names = ", ".join(name for name, _ in _ENCODERS[suffix])

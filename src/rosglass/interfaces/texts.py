@@ -105,7 +105,7 @@ def _received_or_written(definition: InterfaceDefinition) -> str:
 def _is_msg(definition: InterfaceDefinition, text: str | None = None) -> bool:
     """Return whether a text, by default the definition's own, is ``.msg`` and says the same."""
     parser: Any = _PARSERS[type(definition)]
-    with suppress(DefinitionError):
+    with suppress(DefinitionError):  # then it is not .msg
         parsed = parser(definition.text if text is None else text, definition.name)
         return list(map(_members, parts_of(parsed))) == list(map(_members, parts_of(definition)))
     return False

@@ -95,7 +95,7 @@ def _source(definition: InterfaceDefinition) -> dict[str, str]:
     name, text = definition.name, definition.text.partition("\n===")[0]
     kind = name.split("/")[1]
     for encoding in (kind, "idl"):
-        with suppress(DefinitionError):
+        with suppress(DefinitionError):  # it is in another language
             parsed = _parse(name, encoding, text)
             if _fields(parsed) == _fields(definition):
                 return _record(name, encoding, text)
@@ -218,7 +218,7 @@ class _Texts:
         if not encoding:
             return None, True
         restored, whole = (text, True) if self._verbatim else _restore(text)
-        with suppress(DefinitionError, InvalidNameError):
+        with suppress(DefinitionError, InvalidNameError):  # the peer sent no valid text
             return _parse(name, encoding, restored, self._provider), whole
         return None, True
 
@@ -245,7 +245,7 @@ def _restore(text: str) -> tuple[str, bool]:
     lines = text.split("\n")[:-1]
     if not all(_ESCAPED.fullmatch(line) for line in lines):
         return text, True
-    with suppress(UnicodeDecodeError):
+    with suppress(UnicodeDecodeError):  # then these are not our escapes
         return _ESCAPE.sub(_unescape, "\n".join(lines).encode()).decode(), False
     return text, True
 

@@ -340,7 +340,7 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
         message = {"header": self._header(), "status": status, "result": result}
 
         def publish() -> None:
-            with suppress(NodeClosedError):
+            with suppress(NodeClosedError):  # clients notice that the server has left
                 self._publishers[RESULT].publish(message)
 
         self._publishing.add(publish)
@@ -522,6 +522,6 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
 
 def _ask(master: Master, method: str, name: str) -> Any:
     """Return a parameter's value or full name; None when it is not set."""
-    with suppress(MasterError):
+    with suppress(MasterError):  # it is not set
         return master.call(method, name)
     return None

@@ -602,7 +602,7 @@ class ParameterWatches:
             self._core, self, subscription.name
         )
         watch.join(subscription)
-        with suppress(NodeClosedError):
+        with suppress(NodeClosedError):  # then nothing changes any more
             self._core.add(watch)
 
     def leave(self, subscription: ParameterSubscription) -> None:

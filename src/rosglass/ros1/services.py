@@ -182,7 +182,7 @@ class ServiceTypes(Member):
         self._wanted.add(name)
         if not self._following:
             self._following = True
-            with suppress(NodeClosedError):
+            with suppress(NodeClosedError):  # then nothing follows
                 self._core.add(self)
         self._enqueue(name)
 
@@ -212,7 +212,7 @@ class ServiceTypes(Member):
     def _locate(self, name: str) -> None:
         """Ask the master where the server is; on a thread that may wait."""
         location: ServiceLocation | None = None
-        with suppress(ConnectionLostError):
+        with suppress(ConnectionLostError):  # it is tried again later
             location = locate(self._core.master, name)
         self._core.loop.call(lambda: self._probe(name, location))
 

@@ -196,7 +196,7 @@ class _Fetch(Member):
         return None if self._node or self._hash else self._in_library()
 
     def _in_library(self) -> AnyType | None:
-        with suppress(TypeNotFoundError):
+        with suppress(TypeNotFoundError):  # the library has none
             return load(self._name, ros=1, library=self._core.types.library)
         return None
 
@@ -306,7 +306,7 @@ class _Fetch(Member):
         if len(found) > 1:
             raise _conflict(self._name, {md5: [name] for md5, (name, _) in found.items()})
         (_, action) = next(iter(found.values()))
-        with suppress(DefinitionConflictError):
+        with suppress(DefinitionConflictError):  # the library keeps its own
             self._core.types.library.add(action.definition)
         return action
 

@@ -672,7 +672,7 @@ class ParameterServices(Handle):
         events = node.create_publisher(EVENTS, EVENT_TYPE, EVENTS_QOS)
 
         def publish(change: Change) -> None:
-            with suppress(NodeClosedError):
+            with suppress(NodeClosedError):  # then nothing is to be reported
                 events.publish(event_to_message(parameters.node, node.now(), *change))
 
         self._made += [events, parameters.changes.add(publish, IMMEDIATE)]

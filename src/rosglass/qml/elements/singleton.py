@@ -491,7 +491,7 @@ class ValueFunctions(GraphSingleton):
         names = [name.removesuffix("Action"), name] if action else [name]
         tries = [(ros, one) for ros in (self.DIALECT.ros, 3 - self.DIALECT.ros) for one in names]
         for ros, one in tries:
-            with suppress(TypeNotFoundError):
+            with suppress(TypeNotFoundError):  # the next one may exist
                 return rosglass.load(one, ros=ros)
         return rosglass.load(name, ros=self.DIALECT.ros)
 

@@ -357,7 +357,7 @@ def shown_transform(
 def _described(buffer: TransformBuffer, info: FrameInfo) -> dict[str, Any]:
     placed = rosglass.tf.Transform()
     if info.parent:
-        with suppress(TransformException):
+        with suppress(TransformException):  # not connected at a common time
             placed = buffer.lookup_transform(info.parent, info.name)
     return {
         "frameId": info.name,

@@ -256,7 +256,7 @@ class RendererChoice:
         """Add a file that will be shown later, whose needs are also considered."""
         if self.renderer:
             return
-        with suppress(QmlError):
+        with suppress(QmlError):  # showing it reports the problem
             self._expected.append(interface_file(file))
 
     def choose(self, import_paths: Sequence[str]) -> str:

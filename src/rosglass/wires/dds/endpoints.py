@@ -257,7 +257,7 @@ class SampleReader:
         if eager == self._eager or self._closed:
             return
         self._eager = eager
-        with suppress(NodeClosedError):
+        with suppress(NodeClosedError):  # it was deleted
             set_events(self.entity, self._events | (Event.DATA_AVAILABLE if eager else Event.NONE))
             self._participant.pump.poll(self.entity, None if eager else self._poll)
 
@@ -283,13 +283,13 @@ class SampleReader:
 
     def lost(self) -> int:
         """Return how many samples were announced but never received."""
-        with suppress(NodeClosedError):
+        with suppress(NodeClosedError):  # it was deleted
             self._lost = lost_samples(self.entity)
         return self._lost
 
     def alive(self) -> int:
         """Return how many of the matched writers assert their liveliness."""
-        with suppress(NodeClosedError):
+        with suppress(NodeClosedError):  # it was deleted
             return alive_writers(self.entity)
         return 0
 
@@ -312,7 +312,7 @@ class SampleReader:
             delivering.release()
         # An unread status keeps waking the pump; reading it costs as much as taking a sample.
         if self._on_matched is not None and self._count == count:
-            with suppress(NodeClosedError):
+            with suppress(NodeClosedError):  # it was deleted
                 if subscription_matched(self.entity):
                     self._on_matched()
         return more

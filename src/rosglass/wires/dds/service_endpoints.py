@@ -440,7 +440,7 @@ class ServiceEndpoints:
     def _on_event(self) -> None:
         if self.closed or self.writer is None:
             return
-        with suppress(NodeClosedError):
+        with suppress(NodeClosedError):  # it was deleted
             if publication_matched(self.writer.entity):
                 self.refresh()
         if self.outbox.retry():

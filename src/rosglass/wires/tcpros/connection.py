@@ -508,8 +508,7 @@ class Incoming:
         """Return a buffer of at least that size, a spare one if there is no view of it."""
         for index, spare in enumerate(self._spare):
             if size <= len(spare) <= 2 * size:
-                with suppress(BufferError):
-                    # It cannot grow while there is a view of it.
+                with suppress(BufferError):  # it cannot grow while there is a view of it
                     spare.append(0)
                     spare.pop()
                     return self._spare.pop(index)

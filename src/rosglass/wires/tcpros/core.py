@@ -299,7 +299,7 @@ class AnnouncedTypes(Types):
         if isinstance(wanted, str) and wanted.endswith("Action"):
             package, kind, base = split_name(wanted)
             if kind != "action" and base != "Action":
-                with suppress(TypeNotFoundError):
+                with suppress(TypeNotFoundError):  # a message may have this name
                     return super().action(f"{package}/action/{base.removesuffix('Action')}", hash)
         return super().action(wanted, hash)
 
@@ -383,6 +383,6 @@ class AnnouncedTypes(Types):
                 f"{full}: its publisher announces md5 {md5}, but the definition it sends has "
                 f"{found.md5}; {adding_definitions(full, 1)}"
             )
-        with suppress(DefinitionConflictError):
+        with suppress(DefinitionConflictError):  # the library keeps its own
             self.library.add(found.definition)
         return found

@@ -381,7 +381,7 @@ class Master:
     def call(self, method: str, *arguments: Any, timeout: float = _TIMEOUT_S) -> Any:
         """Call a method with the node's name first; raises what :func:`call_node` does."""
         connection = self._server.connection()
-        with suppress(IndexError):
+        with suppress(IndexError):  # none is idle: a new one is used
             connection = self._idle.pop()
         self._busy.add(connection)  # before `_closed` is read, which close() sets first
         answered = False

@@ -187,9 +187,8 @@ class Registrations:
         # Until then, the master may list a node that was killed under this name.
         listed = any(member.lists_node for member in self._registered)
         if self._registered:
-            with suppress(
-                MasterError
-            ):  # the name is unknown: the master has lost all registrations
+            # The name is unknown if the master has lost all registrations.
+            with suppress(MasterError):
                 uri = core.master.call("lookupNode", core.name.full)
             # A new master may list the node after another call, without its registrations.
             if not uri or process != self._process:
@@ -208,7 +207,7 @@ class Registrations:
                     # It may leave before it was ever registered itself.
                     self._tried.add(successor)
                 else:
-                    with suppress(MasterError):
+                    with suppress(MasterError):  # it is not registered there
                         member.unregister(self._core.master)
                 self._tried.discard(member)
                 self._registered.discard(member)
@@ -292,7 +291,7 @@ class Registrations:
 
     def _leave(self) -> None:
         core = self._core
-        with suppress(ConnectionLostError):
+        with suppress(ConnectionLostError):  # close() unregisters the rest later
             for member in [*self._leaving, *self._tried]:
                 if member in self._tried:
                     _unregister_member(member, core.master)

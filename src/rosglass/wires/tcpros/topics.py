@@ -180,7 +180,7 @@ class Topics:
         for end in ends:
             self._core.pool.run(lambda node=end.node: ask(node))  # type: ignore[misc]
         until = None if timeout is None else time.monotonic() + timeout
-        with suppress(Empty):
+        with suppress(Empty):  # the time is up
             for _ in ends:
                 wait = None if until is None else max(0.0, until - time.monotonic())
                 node, header = answers.get(timeout=wait)
