@@ -39,6 +39,7 @@ _OF_GENPY = {
     "_request_class",
     "_response_class",
     "_slot_types",
+    "_type",
 }
 _MESSAGES = 300
 #: How long a trace may take.
@@ -80,6 +81,7 @@ def private_reaches(sources: list[Source]) -> int:
         and not node.attr.startswith("__")
         and node.attr not in _OF_TUPLES | _OF_GENPY
         and getattr(node.value, "id", "") not in {"self", "cls", "os", "sys", "ctypes"}
+        and getattr(getattr(node.value, "func", None), "id", "") != "super"
         for source in sources
         for node in ast.walk(source.tree)
         if isinstance(node, ast.Attribute)

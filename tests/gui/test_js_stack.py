@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from inside import has_seen_the_loop, root_of
+from inside import root_of
 from local_world import LocalWorld
 
 from rosglass.qml import Session
@@ -59,7 +59,7 @@ def runner(app: Any, tmp_path: Path, caplog: Any, wait: Callable[..., None]) -> 
     runner.load()
     runner.operator.root = root_of(runner)
     # Until the event loop is known to run, only JavaScript is looked at.
-    wait(lambda: has_seen_the_loop(session.shared[Watchdog]))
+    wait(lambda: session.shared[Watchdog].lives)
     yield runner
     runner.close()
     session.close()

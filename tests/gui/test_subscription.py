@@ -715,6 +715,6 @@ def test_a_message_that_has_waited_for_a_screen_that_stood_still_is_as_old_as_it
     chat.publish(data="waiting")
     # The screen stands still.
     eventually(lambda: endpoint.statistics().received > received)
-    inbox_of(endpoint)._last_time -= 30
+    inbox_of(endpoint).last_time -= 30
     wait(lambda: "waiting" in root.shown())
     assert root.shown() == "before false false,waiting true true"

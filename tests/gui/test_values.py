@@ -136,7 +136,7 @@ def test_long_arrays_are_let_go_when_javascript_has_let_go(bench: Any, wait: Any
     runtime = runtime_of(bench.engine)
     gc.collect()
     bench.engine.collectGarbage()
-    wait(lambda: len(runtime._kept) == 0)
+    wait(lambda: len(runtime.kept) == 0)
 
 
 def test_now_and_qos_are_values(bench: Any) -> None:

@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from inside import has_seen_the_loop, root_of
+from inside import root_of
 from local_world import LocalWorld
 
 from rosglass.errors import Error
@@ -90,7 +90,7 @@ def run(
         runner.load()
         runner.root = root_of(runner)
         # Until the event loop is known to run, only JavaScript is looked at.
-        wait(lambda: has_seen_the_loop(session.shared[Watchdog]))
+        wait(lambda: session.shared[Watchdog].lives)
         return runner
 
     yield run

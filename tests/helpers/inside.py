@@ -86,11 +86,6 @@ def root_of(runner: Any) -> Any:
     return runner._live.made.root
 
 
-def has_seen_the_loop(watchdog: Any) -> bool:
-    """Return whether a watchdog knows that the event loop runs."""
-    return bool(watchdog._lives)
-
-
 def runtime_of(scene: Any) -> Any:
     """Return the runtime that the elements of a scene are made with."""
     return scene._find_runtime()

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rosglass.ros1.node import Ros1Node
-    from rosglass.wires.tcpros.arrivals import BacklogMonitor
     from rosglass.wires.tcpros.topic_subscription import PublisherLink
     from rosglass.wires.tcpros.topics import Topics
 
@@ -29,11 +28,6 @@ def publisher_address(node: Ros1Node, topic: str) -> tuple[str, int]:
 def topics_of(node: Ros1Node) -> Topics:
     """Return what a node publishes and subscribes to, as its wire knows it."""
     return node._topics
-
-
-def backlog_of(link: PublisherLink) -> BacklogMonitor:
-    """Return what estimates how late a connection's messages are."""
-    return link._backlog
 
 
 def publisher_links(node: Ros1Node, topic: str) -> list[PublisherLink]:

@@ -66,7 +66,7 @@ def test_dragging_an_entry_changes_which_is_above(
     assert order(app) == ["Red", "Blue"]
     panel.drag(("Red",), place(panel, "Blue"))
     # Wait for the panel: two moves at once would cancel each other.
-    wait(lambda: [overlay.name for overlay in app.entries._panel_order] == ["Red", "Blue"])
+    wait(lambda: [overlay.name for overlay in app.entries.panel_order] == ["Red", "Blue"])
     panel.drag(("Blue",), place(panel, "Red"))
     wait(lambda: order(app) == ["Blue", "Red"])
     # A number counts more than the place.

@@ -358,8 +358,10 @@ def use_markers(pair: Pair, server: RospyServer) -> None:
     # The middle of the yellow arrow, and of the box with the menu.
     hand.click(hand.at((0.3 + 0.35 * math.cos(0.5), 1 + 0.35 * math.sin(0.5), 0)))
     pair.wait(lambda: server.feedback("facing", 3), lambda: server.lines)
+    asked: list[Any] = []
+    display.menuRequested.connect(lambda *menu: asked.append(menu))
     hand.click(hand.at((0, 2.2, 0)))
-    pair.wait(lambda: display._asked)
+    pair.wait(lambda: asked)
     display.selectMenuEntry(2)
     pair.wait(lambda: server.feedback("choice", 2), lambda: server.lines)
     assert [entry for *_, entry in server.feedback("choice", 2)] == ["2"]

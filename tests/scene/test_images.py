@@ -47,11 +47,6 @@ def shown_of(display: Any) -> Any:
     return display._picture
 
 
-def infos_of(display: Any) -> Any:
-    """Return what receives a display's CameraInfo."""
-    return display._infos
-
-
 class Robot:
     """Publishes images, CameraInfo and transforms."""
 
@@ -87,8 +82,8 @@ class Robot:
 
     def send_info_until_received(self, display: Any, message: dict[str, Any]) -> None:
         """Publish a CameraInfo until the display has received it, and shows what follows."""
-        before = infos_of(display).received
-        self.bench.wait(lambda: self.infos.publish(message) or infos_of(display).received > before)
+        before = display.infos.received
+        self.bench.wait(lambda: self.infos.publish(message) or display.infos.received > before)
         self.bench.wait.settled(self.bench.session)
 
     def place(self, seconds: int = 7, y: float = 0.0) -> None:

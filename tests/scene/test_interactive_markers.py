@@ -135,13 +135,8 @@ def show(bench: SceneBench, server: MarkerServer) -> Callable[..., Any]:
     return load
 
 
-def shapes_of(control: Any) -> Any:
-    """Return what a control draws."""
-    return control._shapes.root
-
-
 def shown(display: Any, name: str = "arm") -> Any:
-    return next(one for one in display._all() if one.record.name == name)
+    return next(one for one in display.all_markers() if one.record.name == name)
 
 
 def place(display: Any, name: str = "arm") -> list[float]:
@@ -610,9 +605,9 @@ def test_controls_face_the_viewer_or_stay_fixed_or_turn_with_the_marker(
         ahead = -bench.view.camera().pose[:3, 2]
         for name in ("facing", "apart"):
             assert axis(name) == pytest.approx(ahead, abs=0.01)
-        group = shapes_of(controls["facing"])
+        group = controls["facing"].shapes.root
         assert group.pose[:3, 0] == pytest.approx(ahead, abs=0.01)
-        group = shapes_of(controls["apart"])
+        group = controls["apart"].shapes.root
         assert group.pose[:3, 0] == pytest.approx([0, 1, 0], abs=0.01)
         bench.view.controller.set("Yaw", 2.0)
         bench.view.camera_moved()

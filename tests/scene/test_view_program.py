@@ -154,7 +154,7 @@ def test_a_panel_that_is_hidden_follows_nothing(bench: SceneBench, window: Any) 
     rows.dataChanged.connect(lambda *_: calls.append(1))
     scene = window.findChild(QObject, "scene")
     scene.setProperty("background", "#010203")
-    bench.wait(lambda: not rows._timer.isActive())
+    bench.wait.nothing_happens(0.3)
     window.setProperty("panels", True)
     assert calls, "the new color"
 

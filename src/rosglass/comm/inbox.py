@@ -263,7 +263,8 @@ class Inbox:
         self._calling = self._closed = False
         self._batch = 1
         self._held_bytes = self._received = self._received_bytes = self._dropped = 0
-        self._last_time = self._next_mark = self._next_log = -math.inf
+        #: Monotonic time at which the last sample arrived; minus infinity before the first.
+        self.last_time = self._next_mark = self._next_log = -math.inf
         self._failures = FailureLog(_log)
         self._meter = _Meter()
 
@@ -276,11 +277,6 @@ class Inbox:
     def waiting(self) -> int:
         """Number of waiting samples."""
         return len(self._samples)
-
-    @property
-    def last_time(self) -> float:
-        """Monotonic time at which the last sample arrived; minus infinity before the first."""
-        return self._last_time
 
     # -- arrival ---------------------------------------------------------------------------------
 
@@ -327,8 +323,8 @@ class Inbox:
         now = time.monotonic()
         if now >= self._next_mark:
             self._next_mark = now + _MARK_PERIOD_S
-            self._meter.mark(now, self._last_time, self._received, self._received_bytes, first)
-        self._last_time = now
+            self._meter.mark(now, self.last_time, self._received, self._received_bytes, first)
+        self.last_time = now
         self._received += count
         self._received_bytes += size
         return now
@@ -406,7 +402,7 @@ class Inbox:
         now = time.monotonic()
         with self._lock:
             return self._meter.read(
-                now, self._last_time, self._received, self._received_bytes, self._dropped, lost
+                now, self.last_time, self._received, self._received_bytes, self._dropped, lost
             )
 
     def lateness_ns(self, sample: Sample) -> tuple[int | None, int | None]:

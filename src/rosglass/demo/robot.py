@@ -85,10 +85,12 @@ class Robot:
     Args:
         node: Its node; the caller closes it after the robot.
         options: Its options.
+        logged_at: When it logged a refused command last, by :func:`time.monotonic`.
         simulation: Its body; a new one in the standard world by default.
 
     Attributes:
         options: Its options.
+        logged_at: When it logged a refused command last, by :func:`time.monotonic`.
         services: Its service and action, and its highest speed, a parameter.
 
     Raises:
@@ -110,7 +112,7 @@ class Robot:
         self._lock = threading.Lock()
         self._ending = threading.Event()
         self._threads: list[threading.Thread] = []
-        self._rejected, self._logged_at = 0, -_LOG_PERIOD_S
+        self._rejected, self.logged_at = 0, -_LOG_PERIOD_S
         self._frame_period, self._render_time = 0.0, 0.0
         self._releases = ReleaseCounter()
         self._send = _publishers(node, self.options)
@@ -211,8 +213,8 @@ class Robot:
     def _on_refused(self, topic: str, error: Error) -> None:
         self._rejected += 1
         now = time.monotonic()
-        if now - self._logged_at >= _LOG_PERIOD_S:
-            self._logged_at = now
+        if now - self.logged_at >= _LOG_PERIOD_S:
+            self.logged_at = now
             _log.warning("%s: %s (%d refused so far)", topic, error, self._rejected)
 
     def _on_velocity(self, message: Message) -> None:

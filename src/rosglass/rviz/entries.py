@@ -484,7 +484,7 @@ class Entries(QtCore.QObject):
         #: Overlays added by the program: they stay when another config file is loaded.
         self._program_overlays: list[Overlay] = []
         #: The overlays in the panel's order at the last synchronization.
-        self._panel_order: list[Overlay] = []
+        self.panel_order: list[Overlay] = []
         self._has_new = False
         self._other_classes: dict[str, Callable[[], Any]] = {}
         self._loading = False
@@ -582,7 +582,7 @@ class Entries(QtCore.QObject):
             for display in self._displays()
             if isinstance(getattr(display, "entry", None), Entry) and display.entry.overlay
         ]
-        before, self._panel_order = self._panel_order, order
+        before, self.panel_order = self.panel_order, order
         moved = [o for o in before if o in order] != [o for o in order if o in before]
         if moved or self._has_new:
             self._stack.reorder(order)

@@ -247,7 +247,7 @@ def test_two_of_our_clients_in_one_process_get_their_own_replies(node, dds_conne
 
 def test_samples_taken_during_reception_do_not_stay(start_services, node, types, monkeypatch):
     """The library keeps its samples until they are taken again, and keeps only some."""
-    readers = cyclone_identity._readers
+    readers = cyclone_identity.readers
     before = set(readers)
     taken: list[bool] = []
     for end in (DdsRequester, DdsReplier):

@@ -46,7 +46,7 @@ def robot(alive: tuple[StubNode, Robot]) -> Robot:
 
 def log_anew(robot: Robot) -> None:
     """Let the robot log the next refused command, as if the last one were long ago."""
-    robot._logged_at = -math.inf
+    robot.logged_at = -math.inf
 
 
 def test_every_topic_is_sent_in_ros_messages(node: StubNode) -> None:

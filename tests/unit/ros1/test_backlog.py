@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from tcpros import backlog_of, publisher_links
+from tcpros import publisher_links
 from waiting import eventually
 
 from rosglass.wires.tcpros import arrivals
@@ -90,11 +90,11 @@ def test_subscriptions_know_by_their_publisher(connect, monkeypatch) -> None:
 
     def is_regular() -> bool:
         publisher.publish(data=True)
-        return backlog_of(publisher_links(cockpit, "/stop")[0]).period > 0
+        return publisher_links(cockpit, "/stop")[0].backlog.period > 0
 
     eventually(is_regular)
     link = publisher_links(cockpit, "/stop")[0]
-    backlog_of(link).received_at -= 30.0  # an outage
+    link.backlog.received_at -= 30.0  # an outage
     while subscription.take() is not None:
         pass
     publisher.publish(data=True)

@@ -106,7 +106,7 @@ def test_commands_to_a_silent_subscriber_expire_here(monkeypatch):
         link.send_frame(Frame([struct.pack("<I", number)], timeout=0.3), keep=1)
 
     try:
-        eventually(lambda: link._connected)
+        eventually(lambda: link.connected)
         silent[0] = True
         for number in at_rate(0.02, 50):
             send(number)

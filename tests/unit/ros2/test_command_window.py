@@ -17,10 +17,11 @@ class Rig:
     def __init__(self, monkeypatch):
         self.now, self.answered, self.linked = 100.0, True, True
         self.sent, self.jobs, self.queries = [], [], 0
+        self.deliver = self.sent.append
         monkeypatch.setattr(command_window, "time", SimpleNamespace(monotonic=lambda: self.now))
         timers = SimpleNamespace(after=lambda _, job: self.jobs.append(job))
         self.window = CommandWindow(
-            timers, 0.3, self._query, lambda data, _: self.sent.append(data), lambda: self.linked
+            timers, 0.3, self._query, lambda data, _: self.deliver(data), lambda: self.linked
         )
 
     def _query(self, _):
@@ -128,7 +129,7 @@ def test_command_that_waits_when_the_session_closes_is_counted(rig, end):
     rig.send("a")
     rig.send("stop", after=0.2)
     assert rig.sent == ["a"]
-    rig.answered, rig.window._send = True, fail
+    rig.answered, rig.deliver = True, fail
     end(rig)
     assert (rig.sent, rig.window.lost) == (["a"], 1)
 

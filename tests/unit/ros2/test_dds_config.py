@@ -54,7 +54,7 @@ def test_on_a_network_a_datagram_is_one_packet(monkeypatch):
     ):
         assert ours(f"dds://?{url}").findtext("General/MaxMessageSize") == size, url
     # Once per process; that of this machine stays for the other tests.
-    assert dds_domain._datagram_size.__wrapped__(()) == 1392
+    assert dds_domain.datagram_size.__wrapped__(()) == 1392
 
 
 def test_the_socket_has_room():
@@ -208,7 +208,7 @@ def test_the_documentations_larger_datagrams_are_those_of_this_machine():
 
 
 def test_publisher_of_single_packets_is_advised_to_send_documented_datagrams(monkeypatch):
-    monkeypatch.setattr(dds_domain, "_datagram_size", lambda _: 1472)
+    monkeypatch.setattr(dds_domain, "datagram_size", lambda _: 1472)
 
     def advice(url="dds://", **env):
         return large_sample_advice(DdsOptions.parse(url, env))

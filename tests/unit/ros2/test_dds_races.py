@@ -161,7 +161,7 @@ def test_nothing_is_sent_that_a_server_just_announced_may_take_for_arguments(
     client = ready(node.create_service_client(SERVICE, ADD))
     assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
     (here,) = node.service_servers(SERVICE)
-    middleware._graph.put_endpoint("fast", replace(here, gid=b"\x01\x0f" + bytes(14)))
+    middleware.graph.put_endpoint("fast", replace(here, gid=b"\x01\x0f" + bytes(14)))
     with pytest.raises(rosglass.Error, match="/add"):
         client.call({"a": 2}, timeout=0.2)
     assert server.got == [1]

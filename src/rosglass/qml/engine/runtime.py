@@ -214,7 +214,8 @@ class Runtime(QtCore.QObject):
         engine.rootContext().setContextProperty(_NAME, self)
         self.session = session
         self._engine = engine
-        self._kept: set[QtCore.QObject] = set()
+        #: Objects that JavaScript has not let go yet.
+        self.kept: set[QtCore.QObject] = set()
         self.host = Host(self)
         #: Returns a message as a JavaScript value; see :meth:`MessageConverter.convert`.
         self.message = MessageConverter(self, engine).convert
@@ -296,8 +297,8 @@ class Runtime(QtCore.QObject):
         QtQml.QQmlEngine.setObjectOwnership(
             item, QtQml.QQmlEngine.ObjectOwnership.JavaScriptOwnership
         )
-        self._kept.add(item)
-        kept = self._kept
+        self.kept.add(item)
+        kept = self.kept
         item.destroyed.connect(lambda: kept.discard(item))
         return item
 

@@ -153,11 +153,11 @@ class Watchdog(QtCore.QObject):
         self._use = _watch_thread(self._number, self._clock)
         affinity = getattr(os, "sched_getaffinity", None)
         self._alone = affinity is not None and len(affinity(0)) == 1
-        #: When the event loop was last seen to run, and in which Python frame; whether it is known
-        #: to run at all.
+        #: When the event loop was last seen to run, and in which Python frame.
         self._beaten = time.monotonic()
         self._loop: tuple[int, object] | None = None
-        self._lives = False
+        #: Whether the event loop is known to run at all.
+        self.lives = False
         #: Time of the thread's last check, and seconds in which it could not check.
         self._looked, self._blind = self._beaten, 0.0
         self._report = ""
@@ -191,7 +191,7 @@ class Watchdog(QtCore.QObject):
         self._watched[id(engine)] = _Watched(engine, stack, report, [stack.frame])
         if self._thread is None:
             self._beaten = self._looked = time.monotonic()
-            self._lives = False
+            self.lives = False
             self._end.clear()
             self._timer.start()
             self._thread = threading.Thread(
@@ -221,7 +221,7 @@ class Watchdog(QtCore.QObject):
         self._loop = _identity(caller) if caller is not None else None
         for watched in self._watched.values():
             watched.waiting[0] = watched.stack.frame
-        lived, self._lives = self._lives, True
+        lived, self.lives = self.lives, True
         report, self._report = self._report, ""
         blind, self._blind = self._blind, 0.0
         limit = self._session.longest_script
@@ -246,7 +246,7 @@ class Watchdog(QtCore.QObject):
     @Slot()
     def _on_quit(self) -> None:
         # It is unknown whether the event loop will run again.
-        self._lives = False
+        self.lives = False
 
     # The watching thread.
 
@@ -295,7 +295,7 @@ class Watchdog(QtCore.QObject):
                 is_own = _are_own(innermost.stack.callers())
                 if self._beaten == beaten and not is_own and self._end_script(innermost, script):
                     return
-            if self._lives and still >= limit and not self._report and self._beaten == beaten:
+            if self.lives and still >= limit and not self._report and self._beaten == beaten:
                 self._report_still(still, innermost)
 
     def _end_script(self, watched: _Watched, seconds: float) -> bool:

@@ -137,7 +137,8 @@ class CameraDisplay(PictureDisplay):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self._waiting: deque[Picture] = deque()
-        self._infos: MessageQueue | None = None
+        #: The queue of CameraInfo; None without a topic.
+        self.infos: MessageQueue | None = None
         self._info_topic = ""
         self._lens: _Lens | None = None
         #: Pose of the camera's frame at the time of the image, in the fixed frame.
@@ -189,7 +190,7 @@ class CameraDisplay(PictureDisplay):
         topic = self._info_topic = camera_info_topic(topic)
         self._placed_at = time.monotonic()
         self._miss_info()
-        queue = self._infos = MessageQueue(
+        queue = self.infos = MessageQueue(
             _read_lens, (_CAMERA_INFO,), session.executor, weak_callback(self._on_info), 1
         )
         qos = QoS(
@@ -198,9 +199,9 @@ class CameraDisplay(PictureDisplay):
 
         def done(result: Any) -> None:
             if isinstance(result, Error):
-                if is_alive(self) and self._infos is queue:
+                if is_alive(self) and self.infos is queue:
                     self.set_status("Camera Info", "error", str(result))
-            elif is_alive(self) and self._infos is queue:
+            elif is_alive(self) and self.infos is queue:
                 self._cleanup["camera info"] = lambda: session.background(result.close)
             else:
                 session.background(result.close)
@@ -212,7 +213,7 @@ class CameraDisplay(PictureDisplay):
         self.set_status("Camera Info", "warn", text)
 
     def _on_closed(self, endpoint: SharedStream | None) -> None:
-        self._infos = self._lens = None
+        self.infos = self._lens = None
         close = self._cleanup.pop("camera info", None)
         if close is not None:
             close()
@@ -220,9 +221,9 @@ class CameraDisplay(PictureDisplay):
         super()._on_closed(endpoint)
 
     def _on_info(self) -> None:
-        if not is_alive(self) or self._infos is None:
+        if not is_alive(self) or self.infos is None:
             return
-        items, error = self._infos.drain()
+        items, error = self.infos.drain()
         before = self._lens
         if error:
             # Another lens would draw the scene at wrong positions.

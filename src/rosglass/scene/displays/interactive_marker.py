@@ -247,7 +247,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
     @Slot()
     def _on_camera(self) -> None:
         self._camera = None
-        for marker in self._all():
+        for marker in self.all_markers():
             marker.face()
 
     @Slot()
@@ -266,14 +266,15 @@ class InteractiveMarkersDisplay(TopicDisplay):
         return not self._view.tools.current.hideInactiveObjects
 
     def _restyle(self) -> None:
-        for marker in self._all():
+        for marker in self.all_markers():
             marker.restyle()
 
     def _redraw(self) -> None:
-        for marker in self._all():
+        for marker in self.all_markers():
             marker.draw()
 
-    def _all(self) -> list[InteractiveMarker]:
+    def all_markers(self) -> list[InteractiveMarker]:
+        """Return the markers of all servers."""
         return [marker for server in self._servers.values() for marker in server.markers.values()]
 
     # -- the connection --------------------------------------------------------------------------
@@ -509,7 +510,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
 
     def _apply(self, server: _Server, update: MarkerUpdate) -> None:
         server.number = update.number
-        parts = sum(marker.record.parts for marker in self._all())
+        parts = sum(marker.record.parts for marker in self.all_markers())
         for record in update.markers:
             marker = server.markers.get(record.name)
             parts -= 0 if marker is None else marker.record.parts
@@ -535,7 +536,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
                 marker.take_pose(frame, stamp, pose)
         for name in update.erased:
             self._erase(server, name)
-        names = sorted(marker.record.name for marker in self._all())
+        names = sorted(marker.record.name for marker in self.all_markers())
         if names != self.markers:
             report(self, markers=names)
 
@@ -608,7 +609,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
         return not any(one.number is not None and not one.silent for one in self._servers.values())
 
     def _show_age(self) -> None:
-        self._is_gone = self._outdated and bool(self._all()) and bool(self.enabled)
+        self._is_gone = self._outdated and bool(self.all_markers()) and bool(self.enabled)
         self._fade()
         if self._is_gone:
             when = time.strftime("%H:%M:%S", time.localtime(self._arrived))
@@ -620,21 +621,21 @@ class InteractiveMarkersDisplay(TopicDisplay):
 
     def on_transforms(self) -> None:
         """Follow the frames of markers."""
-        for marker in self._all():
+        for marker in self.all_markers():
             marker.place()
 
     def on_fixed_frame(self) -> None:
         """Place all markers in another fixed frame."""
-        for marker in self._all():
+        for marker in self.all_markers():
             marker.place_anew()
 
     def followed_frames(self) -> set[str]:
         """Return the frames that markers follow."""
-        return {marker.frame for marker in self._all() if not marker.stamp}
+        return {marker.frame for marker in self.all_markers() if not marker.stamp}
 
     def _fade(self) -> None:
         self.root.alpha = OUTDATED_ALPHA if self._is_gone else 1.0
-        for marker in self._all():
+        for marker in self.all_markers():
             is_outdated = not marker.stamp and marker.frame in self._outdated_frames
             marker.root.alpha = OUTDATED_ALPHA if is_outdated else 1.0
 
@@ -722,7 +723,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
         self._draw_mesh(uri)
 
     def _draw_mesh(self, uri: str) -> None:
-        for marker in self._all():
+        for marker in self.all_markers():
             for control in marker.controls.values():
                 if control.uses_mesh(uri):
                     control.draw()

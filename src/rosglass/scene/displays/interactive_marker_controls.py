@@ -81,12 +81,13 @@ class Control:
         marker: The interactive marker.
         record: Its description.
         root: Its drawables, in the marker's frame.
+        shapes: Those of them that its description has.
     """
 
     def __init__(self, marker: InteractiveMarker, record: ControlRecord) -> None:
         self.display, self.marker, self.record = marker.display, marker, record
         self.root = Group()
-        self._shapes = MarkerGroup(None)
+        self.shapes = MarkerGroup(None)
         #: Poses of the frames of its markers in its own one, as far as they are known.
         self._frames: dict[tuple[str, int], Matrix] = {}
         self._aid = Lines(1.0)
@@ -135,7 +136,7 @@ class Control:
         owner: Any = None
         if self is not self.marker.title:
             owner = self.display if self.record.mode == NONE else self
-        self._shapes = MarkerGroup(owner)
+        self.shapes = MarkerGroup(owner)
         self.place()
         for marker in self.record.markers:
             if marker.problem:
@@ -144,11 +145,11 @@ class Control:
             if pose is None:
                 continue
             try:
-                self._shapes.put(self._painted(marker), pose, self.display.meshes)
+                self.shapes.put(self._painted(marker), pose, self.display.meshes)
             except Error as error:  # one that cannot be drawn does not hide the others
                 self.display.set_line(self.marker.record.name, str(error))
-        self._shapes.flush()
-        self.root.add(self._shapes.root, self._aid)
+        self.shapes.flush()
+        self.root.add(self.shapes.root, self._aid)
 
     def _relative_pose(self, marker: MarkerRecord) -> Matrix | None:
         """Return the pose of a marker's frame in that of the control; None while not known.
@@ -165,7 +166,7 @@ class Control:
             except TransformException as error:
                 self.display.set_line(self.marker.record.name, f"no transform: {error}")
                 return None
-            known = inverse(self.marker.root.pose @ self._shapes.root.pose) @ found
+            known = inverse(self.marker.root.pose @ self.shapes.root.pose) @ found
             self._frames[marker.key] = known
         return known
 
@@ -220,7 +221,7 @@ class Control:
         self._aid.pose = pose
         if self.record.facing == VIEW_FACING and self.record.independent:
             pose = self.marker.pose
-        self._shapes.root.pose = pose
+        self.shapes.root.pose = pose
 
     # -- the mouse -------------------------------------------------------------------------------
 

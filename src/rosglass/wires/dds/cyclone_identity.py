@@ -306,7 +306,7 @@ _from_ser_type = c_void_p, c_void_p, c_int, c_void_p, c_size_t
 _FromSer, _FromSerFree = PYFUNCTYPE(*_from_ser_type), CFUNCTYPE(*_from_ser_type)
 
 #: By the address of their reader's type.
-_readers: dict[int, Origins] = {}
+readers: dict[int, Origins] = {}
 
 
 class Origins:
@@ -333,7 +333,7 @@ class Origins:
     def follow(self, sertype: int) -> None:
         """Record the origins of samples of a type, by the type's address."""
         self._type = sertype
-        _readers[sertype] = self
+        readers[sertype] = self
 
     def pop(self, serdata: int) -> Origin | None:
         """Return and remove the origin of a sample; None if it was sent within this process.
@@ -361,8 +361,8 @@ class Origins:
     def close(self) -> None:
         """Remove all origins, after the reader was deleted."""
         self._take = None
-        if _readers.get(self._type) is self:
-            del _readers[self._type]
+        if readers.get(self._type) is self:
+            del readers[self._type]
         self.recorded.clear()
 
     def record(self, serdata: int, fragments: int) -> None:
@@ -391,7 +391,7 @@ class _Reading(Hook):
             make = small if size <= COPIED else big
             serdata: int | None = make(sertype, kind, fragments, size)
             try:
-                origins = _readers.get(sertype)
+                origins = readers.get(sertype)
                 if serdata is not None and kind == SDK_DATA and origins is not None:
                     origins.record(serdata, fragments)
             except Exception:  # noqa: BLE001 - Cyclone DDS calls this, and cannot raise

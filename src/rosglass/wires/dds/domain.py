@@ -508,11 +508,11 @@ def _is_local(options: DdsOptions) -> bool:
 
 
 def _datagram_size_of(options: DdsOptions) -> int:
-    return _MAX_DATAGRAM if _is_local(options) else _datagram_size(options.interfaces)
+    return _MAX_DATAGRAM if _is_local(options) else datagram_size(options.interfaces)
 
 
 @cache  # all nodes of a process have the same configuration, also after a change of the network
-def _datagram_size(chosen: tuple[str, ...]) -> int:
+def datagram_size(chosen: tuple[str, ...]) -> int:
     """Return the size in bytes of the largest datagrams that need no IP fragments.
 
     Args:

@@ -218,7 +218,7 @@ class DdsMiddleware(Middleware):
         self._participant: Participant | None = None
         self._discovery: DdsDiscovery | None = None
         self._closed = False
-        self._graph: Graph
+        self.graph: Graph
         self._changed: Callable[[], None] = lambda: None
 
     @classmethod
@@ -228,7 +228,7 @@ class DdsMiddleware(Middleware):
 
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
         """Join the domain."""
-        self._graph, self._changed = graph, changed
+        self.graph, self._changed = graph, changed
         self._participant = participant = Participant(self._options)
         self._discovery = DdsDiscovery(participant, graph, self._options.humble, changed)
         changed()
@@ -272,13 +272,13 @@ class DdsMiddleware(Middleware):
 
     def create_requester(self, endpoint: EndpointInfo) -> Requester:
         """Create the DDS writer and reader of a service client."""
-        requester = DdsRequester(self._joined(), self._graph, endpoint)
+        requester = DdsRequester(self._joined(), self.graph, endpoint)
         self._show(endpoint, requester.gid)
         return requester
 
     def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> Replier:
         """Create the DDS reader and writer of a service server."""
-        replier = DdsReplier(self._joined(), self._graph, endpoint, on_request)
+        replier = DdsReplier(self._joined(), self.graph, endpoint, on_request)
         self._show(endpoint, replier.gid)
         return replier
 

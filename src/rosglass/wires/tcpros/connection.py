@@ -553,6 +553,7 @@ class Connection:
         peer: The peer's name once it is known, else its address; for messages.
         header: The peer's header; empty until it is received.
         serial: Its number, unique in this process.
+        connected: Whether the connection is made; its header may not be received yet.
         on_room: Called when the send queue is empty; or None.
     """
 
@@ -583,7 +584,7 @@ class Connection:
         self._unacked = UnackedBytes(sock)
         #: Whether frames are held back while the connection is stalled, and whether they are now.
         self._holds = self._held = False
-        self._connected = False
+        self.connected = False
         #: Bytes to read at once: each read allocates as many.
         self._read_size = _SMALL_READ_BYTES
         self._reading = self._urgent = True
@@ -622,13 +623,13 @@ class Connection:
         if failure not in (0, *_PENDING):
             loop.call(lambda: made.end(os.strerror(failure)))
             return made
-        made._connected = failure == 0
+        made.connected = failure == 0
         made._begin()
         return made
 
     def accept(self) -> None:
         """Begin with an accepted socket."""
-        self._connected = True
+        self.connected = True
         self._begin()
 
     def _begin(self) -> None:
@@ -636,7 +637,7 @@ class Connection:
         self._watch()
 
     def _expire(self) -> None:
-        what = "no connection header was received" if self._connected else "no answer"
+        what = "no connection header was received" if self.connected else "no answer"
         self.end(f"{what} within {_HEADER_TIMEOUT_S:.0f} s")
 
     @property
@@ -709,7 +710,7 @@ class Connection:
             sent = 0
             first = not self._outgoing
             self._holds = self._holds or keep > 0 or keep_bytes > 0
-            if first and self._connected and not self._must_wait(frame.expiry > 0):
+            if first and self.connected and not self._must_wait(frame.expiry > 0):
                 sent = self._write(frame.parts)
                 if sent == frame.size:
                     return
@@ -751,7 +752,7 @@ class Connection:
     def stalled(self) -> bool:
         """True if the peer has not acknowledged sent bytes for half a second; from any thread."""
         with self._lock:
-            return not self._closed and self._connected and self._unacked.stalled()
+            return not self._closed and self.connected and self._unacked.stalled()
 
     def _must_wait(self, command: bool) -> bool:
         """Return whether a frame must not be handed to the system now."""
@@ -798,7 +799,7 @@ class Connection:
         """Send and receive; called by the loop."""
         if self._closed:
             return
-        if not self._connected:
+        if not self.connected:
             failure = self._sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
             if failure:
                 self.end(os.strerror(failure))
@@ -807,7 +808,7 @@ class Connection:
                 # TCP connected the socket to itself: its own port was the free one.
                 self.end(os.strerror(errno.ECONNREFUSED))
                 return
-            self._connected = True
+            self.connected = True
             events |= WRITE
         if events & WRITE:
             self._send_waiting()
@@ -950,7 +951,7 @@ class Connection:
     def _watch(self) -> None:
         if self._closed:
             return
-        sending = bool(self._outgoing and not self._held) or not self._connected
+        sending = bool(self._outgoing and not self._held) or not self.connected
         events = (READ if self._reading else 0) | (WRITE if sending else 0)
         self._loop.watch(self._sock, events, self, urgent=self._urgent)
 

@@ -612,6 +612,7 @@ class PublisherLink:
         epoch: The number of the master that listed it last; counted up by restarts.
         ended: Whether it is removed.
         negotiations: The negotiations of the type on this connection.
+        backlog: How late its messages are.
     """
 
     def __init__(self, subscription: TopicSubscription, uri: str, epoch: int) -> None:
@@ -626,7 +627,7 @@ class PublisherLink:
         self._connection: Connection | None = None
         self._addresses: list[tuple[str, int]] = []
         self._latches = False
-        self._silence, self._backlog, self._count = SilenceMonitor(), BacklogMonitor(), 0
+        self._silence, self.backlog, self._count = SilenceMonitor(), BacklogMonitor(), 0
         self._delay = _RETRY_S
         self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
         self._begin()
@@ -649,7 +650,7 @@ class PublisherLink:
     @property
     def late(self) -> float:
         """Seconds by which its last message was late, if it sends regularly; 0 if it does not."""
-        return self._backlog.late
+        return self.backlog.late
 
     def check_silence(self) -> None:
         """Check whether it has stopped sending; on the node's own thread."""
@@ -657,7 +658,7 @@ class PublisherLink:
         if self.connected and not self._latches and not self.is_local:
             now = time.monotonic()
             self._silence.update(self.name, self._count, now)
-            self._backlog.set_period(self._silence.period, now)
+            self.backlog.set_period(self._silence.period, now)
 
     @property
     def info(self) -> str:
@@ -745,7 +746,7 @@ class PublisherLink:
         self.header, self.problem, self._delay, self._addresses = header, "", _RETRY_S, []
         self.name = header.get("callerid", "") or self.uri
         self._latches = header.get("latching") == "1"
-        self._silence, self._backlog, self._count = SilenceMonitor(), BacklogMonitor(), 0
+        self._silence, self.backlog, self._count = SilenceMonitor(), BacklogMonitor(), 0
         self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
         self.subscription.unreachable.on_publisher_connected(self)
         self.subscription.on_publisher_connected(self)
@@ -753,7 +754,7 @@ class PublisherLink:
     def _on_frames(self, frames: list[Received], _: int) -> None:
         received = time.time_ns()
         self._count += len(frames)
-        self._backlog.add(len(frames), time.monotonic())
+        self.backlog.add(len(frames), time.monotonic())
         if self._silence.problem:
             self.subscription.notify_feeds()  # it has ended
         if self._latches:
