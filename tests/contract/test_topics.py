@@ -76,7 +76,7 @@ def test_a_node_hears_itself(robot, topic, eventually):
         assert subscription.wait(30).message().data == text
 
 
-def test_a_picture_outlives_the_node_that_received_it(link, console):
+def test_image_outlives_the_node_that_received_it(link, console):
     publisher, subscription = link(IMAGE)
     publisher.publish(data=np.arange(100_000, dtype=np.uint8))
     pixels = subscription.wait(30).message().data

@@ -134,25 +134,25 @@ TESTS = {
     "`defaultTransport`":
         "test_image_subscription.py::test_the_preferred_transport_wins_as_soon_as_it_is_there"
         " test_image_subscription.py::test_unusable_topic_is_a_problem",
-    "`subscribed`": "test_image_views.py::test_rarely_wanted_pictures_are_fetched_one_by_one",
+    "`subscribed`": "test_image_views.py::test_rarely_wanted_images_are_fetched_one_by_one",
     "`videoSurface`": "test_video_output.py::test_every_encoding_shows_the_right_colours",
-    "`videoSink`": "test_image_subscription.py::test_raw_pictures_are_shown",
+    "`videoSink`": "test_image_subscription.py::test_raw_images_are_shown",
     "`networkLatency`, `processingLatency`, `latency`":
         "test_image_subscription.py::test_rate_and_latency_are_not_rounded",
     "`framerate`": "test_image_subscription.py::test_rate_and_latency_are_not_rounded",
     "`timeout`":
-        "test_image_views.py::test_throttled_pictures_do_not_time_out_between_their_turns"
+        "test_image_views.py::test_throttled_images_do_not_time_out_between_their_turns"
         " test_image_subscription.py::test_without_timeout_it_stays_but_is_stale",
     "`throttleRate`": "test_image_views.py::test_one_viewer_that_wants_all_gets_all",
     "`enabled`, `play()`, `stop()`": "test_image_views.py::test_stop_takes_it_off_the_screen",
     "`playbackState`": "test_image_views.py::test_the_states_have_names",
-    "`pause()`": "test_image_views.py::test_pause_keeps_the_picture_and_says_that_it_is_old",
-    "`encoding`, `hasAlpha`, `isColor`": "test_image_subscription.py::test_raw_pictures_are_shown",
+    "`pause()`": "test_image_views.py::test_pause_keeps_the_image_and_says_that_it_is_old",
+    "`encoding`, `hasAlpha`, `isColor`": "test_image_subscription.py::test_raw_images_are_shown",
     "sharing": "test_image_subscription.py::test_all_viewers_share_one_stream",
-    "load balancing": "test_image_views.py::test_rarely_wanted_pictures_are_fetched_one_by_one",
+    "load balancing": "test_image_views.py::test_rarely_wanted_images_are_fetched_one_by_one",
     "`ImageTransportManager.setLoadBalancingEnabled(bool)`":
         "test_image_views.py::test_without_load_balancing_the_rest_is_not_decoded",
-    "repeated stamps while throttled": "test_image_views.py::test_a_repeated_picture_is_not_a_new_one",
+    "repeated stamps while throttled": "test_image_views.py::test_repeated_image_is_not_a_new_one",
     "32FC1":
         "unit/images/test_encodings.py::test_depth_in_metres_becomes_millimetres"
         " unit/images/test_depth.py::test_gray_from_0_to_1_is_the_scaling_of_qml_ros_plugin",
@@ -161,14 +161,14 @@ TESTS = {
         " unit/images/test_encodings.py::test_byte_order_is_honoured"
         " unit/images/test_encodings.py::test_bayer_patterns",
     "unsupported encoding":
-        "test_image_subscription.py::test_bad_pictures_are_named_once_and_the_stream_goes_on",
+        "test_image_subscription.py::test_bad_images_are_named_once_and_the_stream_goes_on",
     "queue size in the sharing key":
         "test_image_subscription.py::test_the_newest_wins_and_drops_are_counted",
     "new":
         "test_image_views.py::test_turned_mirrored_cut test_image_views.py::test_shown_image_is_saved"
         " test_image_views.py::test_snapshot_errors_are_reported"
         " test_image_views.py::test_near_and_far_have_different_colors_and_unknown_is_black",
-    "reduction": "test_image_views.py::test_a_large_picture_is_reduced_until_it_is_needed_whole",
+    "reduction": "test_image_views.py::test_large_image_is_reduced_until_it_is_needed_whole",
     # Qt 5 and Qt 6
     "all elements, singletons, values, promises, actions, times, arrays":
         "test_upstream_behaviour.py::test_members_answer_as_in_the_reference",
@@ -272,7 +272,7 @@ TESTS = {
         "test_qmltypes.py::test_the_descriptions_are_those_of_the_types"
         " test_qmltypes.py::test_an_editor_knows_the_types",
     # Publishing images, recordings, synchronization
-    "`ImagePublisher`": "test_image_publisher.py::test_a_panel_as_pictures",
+    "`ImagePublisher`": "test_image_publisher.py::test_a_panel_as_images",
     "`Replay`, `replay:` URLs":
         "test_replay.py::test_watching_a_recording_instead_of_the_robot"
         " test_replay.py::test_from_the_command_line",

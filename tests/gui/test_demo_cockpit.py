@@ -145,7 +145,7 @@ def code_in(picture: np.ndarray) -> framecode.FrameCode:
     return framecode.read(picture[row, left:right, 1])
 
 
-def test_the_window_shows_a_picture_that_is_not_older_than_it_claims(
+def test_the_window_shows_an_image_that_is_not_older_than_it_claims(
     cockpit: CockpitProcess, tmp_path: Path
 ) -> None:
     picture = picture_of(cockpit, tmp_path / "live.png")

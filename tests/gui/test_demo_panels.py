@@ -94,7 +94,7 @@ def test_setting_the_clock_silences_no_part(running: Any, wait: Callable[..., No
     wait(lambda: parts.root.levels() == "3,3")
 
 
-def test_a_picture_that_stands_still_ages_when_the_clock_is_set_back(
+def test_image_that_stands_still_ages_when_the_clock_is_set_back(
     running: Any, wait: Callable[..., None]
 ) -> None:
     pytest.importorskip("PySide6.QtMultimedia", reason="the cockpit needs the extra `camera`")

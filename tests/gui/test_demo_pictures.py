@@ -127,7 +127,7 @@ def test_a_scan_that_stops_is_stale(running: Any, view: Any, wait: Callable[...,
     wait(lambda: not element.property("stale"))
 
 
-def test_a_destroyed_picture_is_not_subscribed_any_more(
+def test_a_destroyed_image_is_not_subscribed_any_more(
     running: Any, view: Any, wait: Callable[..., None]
 ) -> None:
     laser = running.robot.create_publisher("/scan", "sensor_msgs/msg/LaserScan")
@@ -157,7 +157,7 @@ def frame(number: int, age: float = 0.0) -> Any:
     return multimedia.QVideoFrame(image)
 
 
-def test_pictures_are_counted_and_timed(wait: Callable[..., None]) -> None:
+def test_images_are_counted_and_timed(wait: Callable[..., None]) -> None:
     sink, window = multimedia.QVideoSink(), Window()
     figures = CameraFigures(sink, window.item)  # type: ignore[arg-type]
     for count, number in enumerate((65_534, 65_535, 0, 3, 4, 1), start=1):
@@ -169,7 +169,7 @@ def test_pictures_are_counted_and_timed(wait: Callable[..., None]) -> None:
     assert list(figures.latencies) == pytest.approx([0.05] * 6, abs=0.04)
 
 
-def test_pictures_of_other_cameras_are_only_counted() -> None:
+def test_images_of_other_cameras_are_only_counted() -> None:
     sink, window = multimedia.QVideoSink(), Window()
     figures = CameraFigures(sink, window.item)  # type: ignore[arg-type]
     plain = QImage(320, 240, QImage.Format.Format_RGBX8888)

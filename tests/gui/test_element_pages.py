@@ -61,7 +61,7 @@ def test_page_describes_all_members(name: str, types: Any) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(PAGES))
-def test_a_page_has_a_picture_an_example_and_its_place(name: str) -> None:
+def test_a_page_has_a_screenshot_an_example_and_its_place(name: str) -> None:
     text = PAGES[name]
     pictures = re.findall(r"!\[[^]]*\]\(\.\./(images/[^)]*)\)", text)
     assert pictures
@@ -73,7 +73,7 @@ def test_a_page_has_a_picture_an_example_and_its_place(name: str) -> None:
     assert f"elements/{name}.md" in navigation
 
 
-def test_pictures_are_small() -> None:
+def test_screenshots_are_small() -> None:
     sizes = {f.name: f.stat().st_size for f in DOCS.glob("images/examples/*.png")}
     assert [name for name, size in sizes.items() if size > 40_000] == []
 

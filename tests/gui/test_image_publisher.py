@@ -95,7 +95,7 @@ def near(found: Any, wanted: tuple[int, ...], off: int = 2) -> bool:
 
 @pytest.mark.both_qt
 @pytest.mark.parametrize("module", ["Ros2 1.0", "Ros 1.0"])
-def test_a_panel_as_pictures(live: Bench, robot: Robot, module: str, wait: Any) -> None:
+def test_a_panel_as_images(live: Bench, robot: Robot, module: str, wait: Any) -> None:
     live.module = module
     found = robot.listen("/panel/image", IMAGE)
     root: Any = live.load(window('frameId: "screen"; rate: 30'), IMPORTS)
@@ -142,7 +142,7 @@ def test_compressed(live: Bench, robot: Robot, kind: str, encoding: str, wait: A
 
 
 @pytest.mark.parametrize(("module", "name"), [("Ros2 1.0", "k"), ("Ros 1.0", "K")])
-def test_camera_info_has_the_stamp_of_its_picture(
+def test_camera_info_has_the_stamp_of_its_image(
     live: Bench, robot: Robot, module: str, name: str, wait: Any
 ) -> None:
     live.module = module

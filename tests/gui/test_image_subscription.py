@@ -64,7 +64,7 @@ def camera(running: Any) -> Any:
 
 
 @pytest.mark.both_qt
-def test_raw_pictures_are_shown(running: Any, camera: Any, wait: Any) -> None:
+def test_raw_images_are_shown(running: Any, camera: Any, wait: Any) -> None:
     root = load(running)
     sub = root.property("sub")
     assert sub.property("stale")
@@ -145,7 +145,7 @@ class TestStale:
         wait(lambda: colour(root) == RED)
         return root
 
-    def test_the_picture_goes_blank_after_the_timeout(
+    def test_the_image_goes_blank_after_the_timeout(
         self, live: Any, camera: Any, wait: Any
     ) -> None:
         wait(lambda: colour(live) is None)
@@ -193,7 +193,7 @@ class TestStale:
         (picture(width=2**32 - 1, height=2**32 - 1), "more than"),
     ],
 )
-def test_bad_pictures_are_named_once_and_the_stream_goes_on(
+def test_bad_images_are_named_once_and_the_stream_goes_on(
     running: Any, camera: Any, wait: Any, caplog: Any, bad: dict, reason: str
 ) -> None:
     root = load(running)
@@ -320,7 +320,7 @@ def test_a_sink_that_is_destroyed_ends_the_subscription(
 
 
 @pytest.mark.parametrize("timeout", [2000, 0])
-def test_pictures_that_a_silent_link_kept_back_are_not_live(
+def test_images_that_a_silent_link_kept_back_are_not_live(
     running: Any, camera: Any, wait: Any, timeout: int
 ) -> None:
     root = load(running, f'topic: "/cam"; timeout: {timeout}')
@@ -358,7 +358,7 @@ def test_camera_without_publisher_is_logged(
     assert caplog.text.count("this topic has no publisher") == 1
 
 
-def test_a_picture_that_comes_while_its_stream_is_made(
+def test_image_that_comes_while_its_stream_is_made(
     running: Any, camera: Any, wait: Any, monkeypatch: Any
 ) -> None:
     from rosglass.qml.elements import image_stream
@@ -379,7 +379,7 @@ def test_a_picture_that_comes_while_its_stream_is_made(
     assert answers == [True]
 
 
-def test_a_picture_whose_stamp_is_old_is_not_shown(running: Any, camera: Any, wait: Any) -> None:
+def test_image_whose_stamp_is_old_is_not_shown(running: Any, camera: Any, wait: Any) -> None:
     root, all_shown = load(running), load(running)
     sub = root.property("sub")
     all_shown.property("sub").setProperty("timeout", 0)

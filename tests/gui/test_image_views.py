@@ -159,7 +159,7 @@ def test_viewers_of_one_camera_look_at_it_differently(
     assert images[0] is images[1]
 
 
-def test_a_region_outside_the_picture_concerns_only_its_viewer(
+def test_a_region_outside_the_image_concerns_only_its_viewer(
     running: Any, camera: Any, wait: Any
 ) -> None:
     root = load(running, count=2)
@@ -195,7 +195,7 @@ def _rect(*edges: float) -> Any:
         ("timeout: -1", "timeout -1"),
     ],
 )
-def test_impossible_values_are_refused_and_the_picture_is_shown_as_before(
+def test_impossible_values_are_refused_and_the_image_is_shown_as_before(
     running: Any,
     module: str,
     camera: Any,
@@ -241,7 +241,7 @@ class TestDepth:
             np.testing.assert_allclose(shown[0], shown[1], atol=1)
             np.testing.assert_allclose(shown[0], 255 * millimetres / 5000, atol=1)
 
-    def test_pictures_without_depths_are_shown_as_they_are(
+    def test_images_without_depths_are_shown_as_they_are(
         self, running: Any, camera: Any, wait: Any
     ) -> None:
         root = load(running, 'colorMap: "turbo"')
@@ -295,7 +295,7 @@ def filming(camera: Any) -> Iterator[Filming]:
 
 
 class TestThrottle:
-    def test_rarely_wanted_pictures_are_fetched_one_by_one(
+    def test_rarely_wanted_images_are_fetched_one_by_one(
         self, running: Any, module: str, camera: Any, wait: Any, filming: Filming
     ) -> None:
         root = load(running, "throttleRate: 2")
@@ -350,9 +350,7 @@ class TestThrottle:
         )
         assert 0 < sub.property("framerate") < 8
 
-    def test_a_repeated_picture_is_not_a_new_one(
-        self, running: Any, camera: Any, wait: Any
-    ) -> None:
+    def test_repeated_image_is_not_a_new_one(self, running: Any, camera: Any, wait: Any) -> None:
         """Latched ROS 1 publishers send their last image to each new subscriber."""
         root = load(running, "throttleRate: 50; timeout: 500")
         sub = root.property("sub0")
@@ -367,7 +365,7 @@ class TestThrottle:
             assert time.monotonic() < until, "it was shown as live again and again"
         assert sub.property("stale")
 
-    def test_throttled_pictures_do_not_time_out_between_their_turns(
+    def test_throttled_images_do_not_time_out_between_their_turns(
         self, running: Any, camera: Any, wait: Any, filming: Filming
     ) -> None:
         root = load(running, "throttleRate: 0.5; timeout: 1500")
@@ -382,7 +380,7 @@ class TestThrottle:
 
 
 class TestPlayback:
-    def test_pause_keeps_the_picture_and_says_that_it_is_old(
+    def test_pause_keeps_the_image_and_says_that_it_is_old(
         self, running: Any, module: str, camera: Any, wait: Any
     ) -> None:
         root = load(running)
@@ -417,7 +415,7 @@ class TestPlayback:
         assert (sub.property("playbackState"), sub.property("enabled")) == (1, True)
         show(running, camera, wait, root, quarters())
 
-    def test_another_topic_does_not_show_the_paused_picture(
+    def test_another_topic_does_not_show_the_paused_image(
         self, running: Any, camera: Any, wait: Any
     ) -> None:
         root = load(running)
@@ -521,7 +519,7 @@ class TestReduction:
         image = image_of(root.property("view0"))
         return 0 if image is None else image.width()
 
-    def test_a_large_picture_is_reduced_until_it_is_needed_whole(
+    def test_large_image_is_reduced_until_it_is_needed_whole(
         self, running: Any, module: str, camera: Any, wait: Any, window: Any, tmp_path: Path
     ) -> None:
         root = load(running)
@@ -552,7 +550,7 @@ class TestReduction:
         sub.setProperty("fullResolution", True)
         wait(lambda: shown(256))
 
-    def test_turned_pictures_are_measured_against_their_other_side(
+    def test_turned_images_are_measured_against_their_other_side(
         self, running: Any, camera: Any, wait: Any, window: Any
     ) -> None:
         root = load(running, "rotation: 90")
@@ -564,7 +562,7 @@ class TestReduction:
         # 256 x 192 on 48 x 64: a quarter of each side.
         wait(lambda: camera.publish(large) or self.width(root) == 48)
 
-    def test_a_part_of_a_picture_is_not_reduced(
+    def test_a_part_of_an_image_is_not_reduced(
         self, running: Any, camera: Any, wait: Any, window: Any
     ) -> None:
         root = load(running, "regionOfInterest: Qt.rect(0, 0, 128, 96)")

@@ -201,7 +201,7 @@ def test_publishers_are_counted_that_match(running: Any, wait: Any) -> None:
 
 
 @EVERY_WIRE
-def test_a_picture_that_was_latched_before_is_shown(live: Any, wait: Any) -> None:
+def test_image_that_was_latched_before_is_shown(live: Any, wait: Any) -> None:
     picture = {"width": 1, "height": 1, "encoding": "rgb8", "step": 3, "data": [1, 2, 3]}
     publisher = live.robot.create_publisher("/plan", "sensor_msgs/msg/Image", QoS.latched())
     publisher.publish(picture)

@@ -396,8 +396,8 @@ SAME: dict[tuple[str, str], dict[str, Any]] = {
         **IMAGE,
         "encoding": ("image.encoding", ""),
         "hasAlpha": ("image.hasAlpha", False),
-        "isColor": "test_image_subscription.py::test_raw_pictures_are_shown",
-        "videoSink": "test_image_subscription.py::test_raw_pictures_are_shown",
+        "isColor": "test_image_subscription.py::test_raw_images_are_shown",
+        "videoSink": "test_image_subscription.py::test_raw_images_are_shown",
         "videoSurface": "test_video_output.py::test_every_encoding_shows_the_right_colours",
     },
 }  # fmt: skip

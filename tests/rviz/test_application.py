@@ -123,7 +123,7 @@ def test_overlays_get_names_of_their_own(app: Any, tmp_path: Path) -> None:
     assert len(list(app.overlays)) == 3
 
 
-def test_pictures_of_the_window(app: Any, grab: Any, tmp_path: Path) -> None:
+def test_screenshots_of_the_window(app: Any, grab: Any, tmp_path: Path) -> None:
     from rosglass.qt import QtGui
 
     file = tmp_path / "Panel.qml"

@@ -98,7 +98,7 @@ def interface(folder: Path, code: str, after: int = 500, name: str = "Overlay.qm
     return file
 
 
-def test_shows_overlays_over_rviz_and_takes_a_picture(
+def test_shows_overlays_over_rviz_and_takes_a_screenshot(
     start: Callable[..., Program], tmp_path: Path
 ) -> None:
     from rosglass.qt import QtGui
@@ -118,7 +118,7 @@ def test_shows_overlays_over_rviz_and_takes_a_picture(
     assert "#303030" in colours
 
 
-def test_a_picture_that_was_not_taken_is_missed(
+def test_screenshot_that_was_not_taken_is_missed(
     start: Callable[..., Program], tmp_path: Path
 ) -> None:
     file, picture = interface(tmp_path, "Qt.quit()"), tmp_path / "picture.png"

@@ -75,7 +75,7 @@ def test_without_a_graphics_card_the_software_renderer_draws(
     assert "not drawn" not in said
 
 
-def test_pictures_do_not_decide_before_the_files_are_read(
+def test_screenshots_do_not_decide_before_the_files_are_read(
     qml: Any, chosen: Callable[..., str], tmp_path: Path
 ) -> None:
     (tmp_path / "dot.ppm").write_text("P3 1 1 255 255 0 0")

@@ -211,7 +211,7 @@ def test_scaled_overlays_have_as_many_units_less(show: Any, grab: Any, app: Any)
     assert (root.width(), root.height()) == (width * 2, height * 2)
 
 
-def test_pictures_of_idle_overlays_are_released(show: Any, grab: Any, wait: Any) -> None:
+def test_frames_of_idle_overlays_are_released(show: Any, grab: Any, wait: Any) -> None:
     from rosglass.rviz.qt5 import QtGui
 
     overlay = show(f"Item {{ {square(40, 40, '#0080ff')} }}")
@@ -245,7 +245,7 @@ def test_text_is_as_sharp_as_text_of_the_size_that_it_is_seen_in(
     assert np.abs(seen[part] - wanted[part]).mean() < 0.6 * blur
 
 
-def test_resized_views_show_no_stretched_picture(app: Any, show: Any, grab: Any, wait: Any) -> None:
+def test_resized_views_show_no_stretched_frame(app: Any, show: Any, grab: Any, wait: Any) -> None:
     overlay = show(
         "Item {\n"
         "Rectangle { width: 50; height: 50; anchors { right: parent.right; bottom: parent.bottom }"
@@ -437,7 +437,7 @@ def test_overlays_that_come_and_go_leave_nothing_behind(
     assert colour(grab(), 70, 70) == BLUE
 
 
-def test_camera_pictures_are_drawn(app: Any, show: Any, grab: Any, wait: Any, master: str) -> None:
+def test_camera_images_are_drawn(app: Any, show: Any, grab: Any, wait: Any, master: str) -> None:
     import rosglass
 
     show(

@@ -104,7 +104,7 @@ def test_only_changed_parts_are_painted_and_compared(
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.7, 1.5])
-def test_painting_in_parts_gives_the_same_picture(lights: Callable[..., Any], scale: float) -> None:
+def test_painting_in_parts_gives_the_same_frame(lights: Callable[..., Any], scale: float) -> None:
     overlay = lights(scale=scale)
 
     def picture() -> NDArray[np.uint32]:

@@ -67,7 +67,7 @@ def demo(tmp_path: Path) -> Iterator[Callable[[float], subprocess.Popen[str]]]:
         process.wait()
 
 
-def test_it_takes_a_picture_and_ends(demo: Any, tmp_path: Path) -> None:
+def test_it_takes_a_screenshot_and_ends(demo: Any, tmp_path: Path) -> None:
     process = demo(6)
     output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, output

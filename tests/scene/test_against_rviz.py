@@ -258,7 +258,7 @@ def test_every_class_of_rviz_is_compared() -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_pictures_are_those_of_rviz(pair: Pair, name: str) -> None:
+def test_frames_are_those_of_rviz(pair: Pair, name: str) -> None:
     case = CASES[name]
     for parameter, value in case.parameters.items():
         pair.robot.parameter_server.set(parameter, value)

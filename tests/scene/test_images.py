@@ -113,7 +113,7 @@ def close(a: tuple[int, ...], b: tuple[int, ...], tolerance: int = 3) -> bool:
     return max(abs(int(x) - int(y)) for x, y in zip(a, b, strict=True)) <= tolerance
 
 
-def test_a_panel_shows_the_pictures(bench: SceneBench, load: Callable[..., Any]) -> None:
+def test_a_panel_shows_the_images(bench: SceneBench, load: Callable[..., Any]) -> None:
     display, robot = load(IMAGE + PANEL)
     robot.show(display)
     assert pixel(bench) == (0, 255, 255)
@@ -161,7 +161,7 @@ def test_a_display_that_is_removed_leaves_no_panel(
     bench.wait(lambda: robot.images.subscription_count() == 0)
 
 
-def test_a_picture_that_is_not_live_fades(bench: SceneBench, load: Callable[..., Any]) -> None:
+def test_image_that_is_not_live_fades(bench: SceneBench, load: Callable[..., Any]) -> None:
     display, robot = load(IMAGE + PANEL)
     robot.show(display)
     robot.images.close()
@@ -171,7 +171,7 @@ def test_a_picture_that_is_not_live_fades(bench: SceneBench, load: Callable[...,
     assert close(pixel(bench), (0, 89, 89)), "35 % of the picture, on black"
 
 
-def test_an_old_picture_fades_though_its_publisher_lives(
+def test_old_image_fades_though_its_publisher_lives(
     bench: SceneBench, load: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass.scene.displays import image
@@ -191,7 +191,7 @@ def test_an_old_picture_fades_though_its_publisher_lives(
     bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
 
 
-def test_a_picture_does_not_fade_while_a_simulation_is_paused(
+def test_image_does_not_fade_while_a_simulation_is_paused(
     bench: SceneBench, load: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass.scene.displays import image
@@ -232,7 +232,7 @@ def test_depths_are_shown_in_greys(bench: SceneBench, load: Callable[..., Any]) 
     assert "Min Value 12 is not below Max Value 12" in display.statusText
 
 
-def test_compressed_pictures_are_shown(bench: SceneBench, load: Callable[..., Any]) -> None:
+def test_compressed_images_are_shown(bench: SceneBench, load: Callable[..., Any]) -> None:
     import cv2
 
     display, robot = load(IMAGE.replace("id:", 'transport: "compressed"; id:') + PANEL)
@@ -255,7 +255,7 @@ def test_compressed_pictures_are_shown(bench: SceneBench, load: Callable[..., An
         ({"data": np.zeros(5, np.uint8)}, "data has 5"),
     ],
 )
-def test_a_bad_picture_is_an_error_in_words(
+def test_bad_image_is_an_error_in_words(
     bench: SceneBench, load: Callable[..., Any], fields: dict[str, Any], text: str
 ) -> None:
     display, robot = load(IMAGE + PANEL)
@@ -307,7 +307,7 @@ def expected(y: float = 0.0, *, p: list[float] = P) -> tuple[float, float]:
     return (400 - wide) / 2 + u * wide / WIDTH, (300 - high) / 2 + v * high / HEIGHT
 
 
-def test_the_scene_fits_the_picture(bench: SceneBench, camera: tuple[Any, Robot]) -> None:
+def test_the_scene_fits_the_image(bench: SceneBench, camera: tuple[Any, Robot]) -> None:
     display, robot = camera
     display.imageRendering = "background"
     assert display.statusLevel == "ok", display.statusText
@@ -329,7 +329,7 @@ def test_the_right_camera_of_a_pair_is_beside_its_frame(
     assert middle_of_ball(bench) == pytest.approx(expected(p=right), abs=2)
 
 
-def test_a_picture_may_be_of_a_region_of_the_sensor(
+def test_image_may_be_of_a_region_of_the_sensor(
     bench: SceneBench, camera: tuple[Any, Robot]
 ) -> None:
     display, robot = camera
@@ -341,7 +341,7 @@ def test_a_picture_may_be_of_a_region_of_the_sensor(
     assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
 
 
-def test_a_single_picture_is_shown_alone_until_its_transform_is_known(
+def test_single_image_is_shown_alone_until_its_transform_is_known(
     bench: SceneBench, load: Callable[..., Any]
 ) -> None:
     display, robot = load(CAMERA + PANEL)
@@ -357,7 +357,7 @@ def test_a_single_picture_is_shown_alone_until_its_transform_is_known(
     bench.wait(lambda: "Transform: Transform OK" in display.statusText)
 
 
-def test_the_picture_is_behind_over_or_both(bench: SceneBench, camera: tuple[Any, Robot]) -> None:
+def test_the_image_is_behind_over_or_both(bench: SceneBench, camera: tuple[Any, Robot]) -> None:
     display, _ = camera
     x, y = (round(part) for part in expected())
     display.imageRendering = "background"
@@ -405,7 +405,7 @@ def test_a_bad_camera_info_draws_no_scene(
     assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
 
 
-def test_a_camera_info_without_a_size_takes_the_pictures(
+def test_a_camera_info_without_a_size_takes_the_images(
     bench: SceneBench, camera: tuple[Any, Robot]
 ) -> None:
     display, robot = camera
@@ -414,7 +414,7 @@ def test_a_camera_info_without_a_size_takes_the_pictures(
     assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
 
 
-def test_without_camera_info_the_picture_is_shown_alone(
+def test_without_camera_info_the_image_is_shown_alone(
     bench: SceneBench, load: Callable[..., Any]
 ) -> None:
     display, robot = load(CAMERA + PANEL)
@@ -424,7 +424,7 @@ def test_without_camera_info_the_picture_is_shown_alone(
     assert pixel(bench, 200, 290) == (0, 255, 255)
 
 
-def test_without_a_transform_the_picture_waits_and_is_then_shown_alone(
+def test_without_a_transform_the_image_waits_and_is_then_shown_alone(
     bench: SceneBench, load: Callable[..., Any]
 ) -> None:
     display, robot = load(CAMERA + PANEL)

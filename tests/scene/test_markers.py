@@ -245,7 +245,7 @@ def test_a_marker_replaces_the_one_of_its_id(show: Callable[..., Any]) -> None:
     assert sorted(labels.texts) == ["a", "b"]
 
 
-def test_a_list_that_is_sent_again_is_drawn_in_each_picture(
+def test_a_list_that_is_sent_again_is_drawn_in_each_frame(
     bench: SceneBench, show: Callable[..., Any]
 ) -> None:
     clear, blue = {**RED, "a": 0.5}, {"b": 1.0, "a": 1.0}

@@ -67,7 +67,7 @@ def test_nothing_is_drawn_while_nothing_changes(bench: SceneBench) -> None:
     bench.wait(lambda: bench.drawn() > before)
 
 
-def test_the_window_is_drawn_once_with_a_new_picture(bench: SceneBench) -> None:
+def test_the_window_is_drawn_once_with_a_new_frame(bench: SceneBench) -> None:
     view = bench.load("AxesDisplay {}")
     (axes,) = view.scene.displays
     frames: list[int] = []
@@ -242,7 +242,7 @@ def test_a_view_whose_scene_is_gone_shows_nothing_old(bench: SceneBench) -> None
     assert other.problem == ""
 
 
-def test_a_picture_that_cannot_be_made_is_a_problem_until_one_can(
+def test_frame_that_cannot_be_made_is_a_problem_until_one_can(
     bench: SceneBench, monkeypatch: Any, caplog: Any
 ) -> None:
     view = bench.load("AxesDisplay {}")
@@ -1198,7 +1198,7 @@ def test_displays_upload_what_is_new_in_turns(
     assert shown[:4] == [(1, 0), (1, 1), (2, 1), (2, 2)], "the path waits for all of the robot"
 
 
-def test_a_grabbed_picture_shows_all(bench: SceneBench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_grabbed_frame_shows_all(bench: SceneBench, monkeypatch: pytest.MonkeyPatch) -> None:
     from rosglass.scene.render import renderer as module
 
     view = bench.load()

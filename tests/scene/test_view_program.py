@@ -502,7 +502,7 @@ def test_the_command_says_what_is_wrong(
     assert "Traceback" not in done.stderr
 
 
-def test_a_picture_without_a_robot_is_noted(app: Any, tmp_path: Path) -> None:
+def test_screenshot_without_a_robot_is_noted(app: Any, tmp_path: Path) -> None:
     picture = tmp_path / "view.png"
     nowhere = f"zenoh://127.0.0.1:{free_port()}"
     done = view_command("--url", nowhere, "--after", "1", "--screenshot", str(picture))

@@ -60,7 +60,7 @@ def test_changed_tiles_are_those_that_differ() -> None:
     assert np.argwhere(changed_tiles(now[::-1], before[::-1])).tolist() == [[6, 5]]
 
 
-def test_only_where_it_may_differ_a_picture_is_compared() -> None:
+def test_only_where_it_may_differ_a_frame_is_compared() -> None:
     before = picture(100, 70)
     now = picture(100, 70, (0, 0, 100, 70))
     changed = changed_tiles(now, before, [Rect(17, 20, 18, 21), Rect(90, 60, 100, 70)])

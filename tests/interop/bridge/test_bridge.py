@@ -55,7 +55,7 @@ def test_to_ros1(bridge, connect, rospy_peer):
 
 
 @pytest.mark.parametrize("way", ["->", "<-"])
-def test_pictures(bridge, connect, rospy_peer, way):
+def test_images(bridge, connect, rospy_peer, way):
     name = "/picture_there" if way == "->" else "/picture_back"
     bridge(["/picture_*"])
     node = connect("ros2", "viewer")

@@ -235,7 +235,7 @@ def test_roscpp_decodes_what_we_publish_with_its_own_classes(connect, roscpp_pee
         assert (received["topic"], received["value"]) == (topic, expected[name])
 
 
-def test_pictures_of_six_megabytes_arrive_whole_both_ways(connect, rospy_peer, roscpp_peer):
+def test_images_of_six_megabytes_arrive_whole_both_ways(connect, rospy_peer, roscpp_peer):
     node = connect("camera")
     value = IMAGE | {"data": bytes(range(256)) * (SIZE // 256)}
     publisher = node.create_publisher("/picture/ours", "sensor_msgs/Image", rosglass.QoS.latched())

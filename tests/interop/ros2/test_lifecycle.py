@@ -282,7 +282,7 @@ def test_nothing_listens_beyond_loopback(router, connect):
     assert listening_addresses() == {"0100007F"}
 
 
-def test_a_stalled_link_drops_pictures_but_no_command(router, start_peer, connect):
+def test_a_stalled_link_drops_images_but_no_command(router, start_peer, connect):
     best_effort = rosglass.QoS.sensor_data()
     node = connect("robot")
     commands = node.create_publisher("/cmd_vel", TWIST)

@@ -173,7 +173,7 @@ def test_big_messages_both_ways(peer, node, size):
     # come late: none is displaced by the next ones.
     [(640, 480, 30, 120, 30), (1920, 1080, 15, 45, 45)],
 )
-def test_rclpy_receives_every_picture(peer, node, width, height, rate, count, depth):
+def test_rclpy_receives_every_image(peer, node, width, height, rate, count, depth):
     """Its socket holds 208 kB by default; bursts of ours overran that again and again."""
     topic = f"/camera{width}"
     do(peer, "subscribe", topic=topic, type=IMAGE, quiet=True, depth=depth)

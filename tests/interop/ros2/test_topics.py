@@ -157,7 +157,7 @@ def test_our_last_latched_message_reaches_a_late_peer(
     assert received == peer_values.VALUES[name]
 
 
-def test_pictures_through_shared_memory(router, start_peer, connect, peer_values):
+def test_images_through_shared_memory(router, start_peer, connect, peer_values):
     name = "sensor_msgs/msg/Image"
     process = start_peer("rosglass", router, publish={"/shm": name}, domain=3, options="&shm=true")
     node = connect("receiver", "?domain=3&shm=true")

@@ -44,7 +44,7 @@ def test_every_pixel_of_every_view_is_drawn(
         assert np.array_equal(*pictures), state
 
 
-def test_pictures_do_not_share_memory(camera: Camera) -> None:
+def test_images_do_not_share_memory(camera: Camera) -> None:
     state = state_at(-5.4, -3.2, 0.5)
     assert not np.shares_memory(camera.render(state), camera.render(state))
 
@@ -57,7 +57,7 @@ def test_sky_is_above_and_floor_below(camera: Camera) -> None:
     assert abs(floor[2] - floor[0]) < 25, "grey"
 
 
-def test_the_picture_follows_the_robot_and_the_carrier(camera: Camera) -> None:
+def test_the_image_follows_the_robot_and_the_carrier(camera: Camera) -> None:
     state = state_at(-5.4, -3.2, 0.55)
     start = camera.render(state)
     assert (camera.render(replace(state, yaw=0.6)) != start).mean() > 0.2
@@ -71,7 +71,7 @@ def test_the_flashlight_lights_what_is_ahead(camera: Camera) -> None:
     assert camera.render(replace(state, flashlight=True))[240:400, 220:420].mean() > 1.2 * dark
 
 
-def test_flippers_reach_into_the_picture(camera: Camera) -> None:
+def test_flippers_reach_into_the_image(camera: Camera) -> None:
     state = state_at(-5.4, -3.2, 0.55)
     up = camera.render(replace(state, flippers=(1.2, 1.2, 0.0, 0.0)))
     down = camera.render(replace(state, flippers=(-1.2, -1.2, 0.0, 0.0)))
@@ -90,7 +90,7 @@ def test_rendering_is_cheap(camera: Camera) -> None:
     assert min(costs) < 0.020
 
 
-def test_the_frame_code_can_be_read_back_from_the_picture(camera: Camera) -> None:
+def test_the_frame_code_can_be_read_back_from_the_image(camera: Camera) -> None:
     picture = camera.render(state_at(-5.4, -3.2, 0.55))
     camera.stamp(picture, NOW, 70_000)
     x, y = CODE_POSITION

@@ -52,7 +52,7 @@ def test_there_is_no_such_mode(stub_node: type[StubNode]) -> None:
 
 
 @pytest.mark.parametrize("name", CAMERAS)
-def test_cameras_show_different_moving_pictures(alive: tuple[Any, Robot], name: str) -> None:
+def test_cameras_show_different_moving_images(alive: tuple[Any, Robot], name: str) -> None:
     node, _ = alive
     image = node.last(f"/{name}_camera/image_raw")
     assert (image.height, image.width, image.step, image.encoding) == (240, 320, 960, "rgb8")

@@ -68,7 +68,7 @@ def test_stamps_are_now(node: StubNode) -> None:
         assert abs(stamp.sec + stamp.nanosec * 1e-9 - time.time()) < 0.5, topic
 
 
-def test_raw_and_compressed_pictures_are_the_same(node: StubNode) -> None:
+def test_raw_and_compressed_images_are_the_same(node: StubNode) -> None:
     import cv2
     import numpy as np
 

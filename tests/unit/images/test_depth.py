@@ -86,7 +86,7 @@ def test_the_range_ignores_outliers_and_is_steady() -> None:
 
 
 @pytest.mark.parametrize(("near", "far"), [(None, None), (None, 2.0), (2.0, None), (5.0, None)])
-def test_a_picture_of_one_depth(near: float | None, far: float | None) -> None:
+def test_image_of_one_depth(near: float | None, far: float | None) -> None:
     view = DepthColors("gray", near, far)
     out = colors(view.convert(millimetres(np.full((H, W), 2000))))
     assert len(np.unique(out[..., 0])) == 1
@@ -117,7 +117,7 @@ def test_bad_settings_are_named(arguments: tuple, reason: str) -> None:
         DepthColors(*arguments)
 
 
-def test_other_pictures_are_named() -> None:
+def test_other_images_are_named() -> None:
     with pytest.raises(UnsupportedError, match="'rgb8' holds no depths"):
         DepthColors().convert(RawImage(2, 2, "rgb8", 6, bytes(12)))
     with pytest.raises(DecodeError, match="step is 3"):

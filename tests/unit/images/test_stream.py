@@ -134,7 +134,7 @@ def send(rig: Rig, *texts: str) -> None:
         rig.node.deliver(Sample(text.encode(), "cdr", kind, 1))
 
 
-def test_every_packet_is_decoded_and_the_newest_picture_shown(rig: Rig, decoder: Counting) -> None:
+def test_every_packet_is_decoded_and_the_newest_frame_shown(rig: Rig, decoder: Counting) -> None:
     decoder.gate.clear()
     send(rig, "header")
     send(rig, *(f"p{number}" for number in range(20)))
@@ -175,7 +175,7 @@ def test_backlog_is_dropped_and_the_decoder_notified(rig: Rig, decoder: Counting
     assert statistics.shown + statistics.dropped == statistics.received
 
 
-def test_depth_has_the_type_of_compressed_pictures_but_its_own_decoder() -> None:
+def test_depth_has_the_type_of_compressed_images_but_its_own_decoder() -> None:
     node = FakeNode("/cam/compressedDepth", "sensor_msgs/msg/CompressedImage")
     rig = Rig(node)
     assert rig.stream.transport in {"", "compressedDepth"}

@@ -51,7 +51,7 @@ def test_unusable_transport_is_named(preferred: str, published: dict, reason: st
         choose("/cam", preferred, published)
 
 
-def test_pictures_stay_where_they_were_received() -> None:
+def test_images_stay_where_they_were_received() -> None:
     choice = choose("/cam", "raw", BOTH)
     assert choice is not None
     kind = rosglass.load(RAW)

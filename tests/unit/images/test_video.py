@@ -118,7 +118,7 @@ ORDERED = ["h264", "hevc;yuv420p;bgr8;bgr8", "libvpx-vp9", "av1", "mjpeg"]
 
 @pytest.mark.parametrize("ros", [1, 2])
 @pytest.mark.parametrize("encoding", ORDERED)
-def test_each_packet_gives_its_picture(encoding: str, ros: int) -> None:
+def test_each_packet_gives_its_frame(encoding: str, ros: int) -> None:
     camera = Camera("ffmpeg", ros)
     for number in range(COUNT):
         image = camera.video(encoding, number)
@@ -126,7 +126,7 @@ def test_each_packet_gives_its_picture(encoding: str, ros: int) -> None:
         check(image, number)
 
 
-def test_reordered_pictures_keep_their_stamps() -> None:
+def test_reordered_frames_keep_their_stamps() -> None:
     camera = Camera("ffmpeg")
     images = [camera.video("h264_nvenc", number) for number in range(COUNT)]
     assert images[0] is None
@@ -317,7 +317,7 @@ def test_theora_after_a_loss() -> None:
     check(theora(camera, 3), 0)
 
 
-def test_theora_repeats_pictures_with_empty_packets() -> None:
+def test_theora_repeats_frames_with_empty_packets() -> None:
     camera = Camera("theora")
     for number in range(4):
         theora(camera, number)

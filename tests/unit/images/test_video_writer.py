@@ -48,7 +48,7 @@ def near(found: Any, colour: tuple[int, int, int]) -> bool:
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".mkv", ".webm"])
-def test_pictures_keep_times_and_colours(tmp_path: Path, suffix: str) -> None:
+def test_frames_keep_times_and_colours(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"video{suffix}"
     writer = VideoWriter(path)
     assert not path.exists()
@@ -92,14 +92,14 @@ def test_a_window_that_changes_its_size(tmp_path: Path) -> None:
     assert near(three[2, 30], BLUE)
 
 
-def test_no_pictures_no_file(tmp_path: Path) -> None:
+def test_no_frames_no_file(tmp_path: Path) -> None:
     writer = VideoWriter(tmp_path / "video.mp4")
     assert writer.close().frames == 0
     assert list(tmp_path.iterdir()) == []
     assert not writer.add(picture(RED), 0.0)
 
 
-def test_pictures_are_dropped_and_counted_while_the_encoder_is_busy(
+def test_frames_are_dropped_and_counted_while_the_encoder_is_busy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(video_writer, "_CLOSE_TIMEOUT_S", 60.0)

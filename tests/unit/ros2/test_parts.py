@@ -43,7 +43,7 @@ def test_the_arrays_of_big_messages_are_not_copied(node, middleware, taking_part
     assert any(np.shares_memory(np.frombuffer(p, "u1"), PIXELS) for p in taking_parts[1] if len(p))
 
 
-def test_a_received_picture_is_passed_on_as_it_is(node, middleware, taking_parts):
+def test_received_image_is_passed_on_as_it_is(node, middleware, taking_parts):
     publisher = node.create_publisher("/camera", IMAGE)
     data = publisher.type.encode(picture(data=PIXELS))
     publisher.publish_serialized(memoryview(data))

@@ -54,7 +54,7 @@ def test_a_mirrored_shape_is_seen_from_the_other_side() -> None:
     assert shape.mirrored().one_sided
 
 
-def test_the_box_around_a_mesh_is_found_once_for_all_pictures() -> None:
+def test_the_box_around_a_mesh_is_found_once_for_all_frames() -> None:
     mesh = Mesh(BOX)
     box = mesh.bounds()
     assert box is not None

@@ -116,7 +116,7 @@ def size_of(picture: bytes) -> object:
 
 
 @pytest.mark.parametrize("picture", [png, jpeg, bmp, gif, tga, webp, webp_extended, webp_lossless])
-def test_sizes_of_pictures(picture, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+def test_sizes_of_images(picture, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     assert check_texture(picture(640, 480)) == (640, 480)
     file = tmp_path / "picture"
     file.write_bytes(picture(12, 34))
@@ -126,7 +126,7 @@ def test_sizes_of_pictures(picture, tmp_path: Path) -> None:  # type: ignore[no-
 
 
 @pytest.mark.parametrize("size", [(20_000, 20_000), (20_000, 1), (16_384, 16_384), (0, 5)])
-def test_pictures_that_are_too_large(size: tuple[int, int]) -> None:
+def test_images_that_are_too_large(size: tuple[int, int]) -> None:
     message = rf"wood.png: the image is {size[0]}x{size[1]} pixels; the limits are .*; reduce it"
     for picture in (png(*size), size):
         with pytest.raises(ResourceError, match=message):

@@ -161,7 +161,7 @@ def test_moving_without_a_button_changes_nothing() -> None:
         assert view.state() == state
 
 
-def test_an_inverted_z_axis_turns_the_picture_over() -> None:
+def test_an_inverted_z_axis_turns_the_frame_over() -> None:
     view = OrbitView()
     view.invert_z = True
     x, y, z = eye(view)
