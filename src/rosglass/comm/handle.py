@@ -5,14 +5,13 @@ from __future__ import annotations
 import sys
 import threading
 from abc import ABC, abstractmethod
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 from rosglass.errors import ArgumentError, UnsupportedError
 
 if TYPE_CHECKING:
     import logging
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from types import FrameType, TracebackType
 
 __all__ = [
@@ -71,8 +70,7 @@ class Handle(Unique, ABC):
         self.close()
 
 
-@contextmanager
-def guarded(log: logging.Logger, text: str, *args: object) -> Iterator[None]:
+class guarded:  # noqa: N801 - it reads as a statement, and a generator costs a call 1 us
     """Log any error of the body, and go on after it.
 
     For bodies that others must not be lost with: a callback of the user's, one of many members,
@@ -84,21 +82,37 @@ def guarded(log: logging.Logger, text: str, *args: object) -> Iterator[None]:
         text: What has failed, as for :meth:`logging.Logger.exception`.
         args: Its arguments.
     """
-    try:
-        yield
-    except BaseException as error:  # sys.exit() must not end a thread that others need
-        reraise_exit(error)
-        log.exception(text, *args)
+
+    __slots__ = ("_args", "_log", "_text")
+
+    def __init__(self, log: logging.Logger, text: str, *args: object) -> None:
+        self._log, self._text, self._args = log, text, args
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool | None:
+        if error is None:
+            return None
+        reraise_exit(error)  # sys.exit() must not end a thread that others need
+        self._log.error(self._text, *self._args, exc_info=error)
+        return True
 
 
-@contextmanager
-def undo_on_error(undo: Callable[[], object]) -> Iterator[None]:
+class undo_on_error:  # noqa: N801 - as above
     """Call `undo` if the body raises anything, Ctrl-C included, and raise that again."""
-    try:
-        yield
-    except BaseException:
-        undo()
-        raise
+
+    __slots__ = ("_undo",)
+
+    def __init__(self, undo: Callable[[], object]) -> None:
+        self._undo = undo
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if error is not None:
+            self._undo()
 
 
 def reraise_exit(error: BaseException) -> None:
