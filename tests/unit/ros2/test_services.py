@@ -664,7 +664,7 @@ def test_closing_a_server(robot, client, eventually):
         return futures[0]
 
     server = robot.create_service_server("/add", ADD, callback)
-    call = client.call_async(timeout=0.2)
+    call = client.call_async(timeout=2)
     assert started.wait(30)
     server.close()
     server.close()
