@@ -7,7 +7,6 @@ import logging
 import threading
 from collections import deque
 from concurrent.futures import Future
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rosglass.comm.executor import Dispatcher, LoopExecutor, executor_for
@@ -18,7 +17,7 @@ from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.errors import DecodeError, Error, NodeClosedError, ServiceError
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Coroutine, Iterator
+    from collections.abc import Awaitable, Callable, Coroutine
 
     from rosglass.comm.core import NodeCore
     from rosglass.comm.handle import Executor
@@ -164,23 +163,25 @@ class ServiceServer(Handle):
         except DecodeError as error:
             self._refuse(request, f"the request is not a {self.type.request.name}: {error}")
             return
-        with self._failure_answered(request):
-            answer = self._callback(message)
-            if inspect.iscoroutine(answer):
-                answer = self._start(answer)
-            if isinstance(answer, Future):
-                answer.add_done_callback(lambda future: self._finish(request, future))
-            else:
-                self._respond(request, answer)
+        self._attempt(request, lambda: self._call(request, message))
 
-    @contextmanager
-    def _failure_answered(self, request: RequestId) -> Iterator[None]:
-        """Answer a request with any error of a user's callback, coroutine or response."""
+    def _attempt(self, request: RequestId, step: Callable[[], None]) -> None:
+        """Run a step towards an answer; any error of the user's code in it is the answer."""
         try:
-            yield
+            step()
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the client waits for an answer
             self._on_failure(request, error)
             reraise_exit(error)
+
+    def _call(self, request: RequestId, message: Message) -> None:
+        """Call back, and respond now or when the callback's future is done."""
+        answer: Any = self._callback(message)
+        if inspect.iscoroutine(answer):
+            answer = self._start(answer)
+        if isinstance(answer, Future):
+            answer.add_done_callback(lambda future: self._finish(request, future))
+        else:
+            self._respond(request, answer)
 
     def _start(self, coroutine: Coroutine[Any, Any, Any]) -> Future[Any]:
         """Start a callback's coroutine."""
@@ -204,8 +205,7 @@ class ServiceServer(Handle):
         if future.cancelled():
             self._refuse(request, "the callback's future was cancelled")
             return
-        with self._failure_answered(request):
-            self._respond(request, future.result(0))
+        self._attempt(request, lambda: self._respond(request, future.result(0)))
 
     def _respond(self, request: RequestId, answer: Any) -> None:
         """Send the callback's response."""

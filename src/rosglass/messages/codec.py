@@ -266,7 +266,7 @@ class Codec:
             reader.prove()
             # Deleting succeeds once: only one thread gets past this line.
             source.line("del m._buffer__")
-        with source.block("except Exception as error:"):
+        with source.block("except Exception as error:"):  # of a peer's bytes; explained
             source.line(f"return {source.bind(failed, 'failed')}(m, error)")
         source.line(f"m.__class__ = {source.bind(self.cls, 'C')}")
         for field, name in names:

@@ -657,7 +657,7 @@ def path_function(
             _Walk(codec, source).schema(reader, codec.schema, targets, last=True)
         results = ", ".join(name for name, _, _ in targets)
         source.line(f"return {results}" if single else f"return ({results},)")
-    with source.block("except Exception as error:"):
+    with source.block("except Exception as error:"):  # of a peer's bytes; explained
         source.line(f"return {source.bind(failed, 'failed')}(b, error)")
     title = f"path {', '.join(paths)} {codec.schema.name} {codec.wire.title}"
     made: Callable[[bytes], Any] = source.compile("path(b)", title)

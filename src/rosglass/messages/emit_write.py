@@ -459,7 +459,7 @@ def write_function(
             writer.check_holder(codec.schema, "m")
             writer.fields(codec.schema, "m")
             writer.finish()
-        with source.block("except Exception as error:"):
+        with source.block("except Exception as error:"):  # of a user's objects; converted slowly
             source.line(f"return {source.bind(convert, 'convert')}(m, error)")
     what = f"encode {'dict' if from_dict else 'message'}{'' if joined else ' parts'}"
     return source.compile("write(m)", f"{what} {codec.schema.name} {codec.wire.title}")
