@@ -14,7 +14,7 @@ from rosglass.errors import ConnectionLostError, Error, UnsupportedError
 from rosglass.extras import install_command
 from rosglass.qml import IMPORT_PATHS, Session, install
 from rosglass.qml.run.modules import register
-from rosglass.qt import QtCore, QtQml
+from rosglass.qt import QtCore, QtQml, send_deferred_deletes
 
 LOG = """QtObject {
     id: root
@@ -277,6 +277,21 @@ def test_engines_share_a_session_and_may_go_first(running: Any, wait: Any, tmp_p
     del engine, other
     wait.settled(running.session)
     assert running.run("return Ros2.getName()") == "ui"
+
+
+@pytest.mark.both_qt
+def test_objects_may_outlive_their_engine(bench: Any, wait: Any) -> None:
+    engine = QtQml.QQmlEngine()
+    install(engine, bench.session)
+    component = QtQml.QQmlComponent(engine)
+    text = b'import QtQml 2.15; import Ros2 1.0; Subscription { topic: "x" }'
+    component.setData(text, QtCore.QUrl("file:///Main.qml"))
+    made: Any = component.create()
+    assert made is not None, component.errorString()
+    engine.deleteLater()
+    send_deferred_deletes()
+    # The element looks for its engine in the next turn, and reports afterwards that it has none.
+    wait(lambda: made.property("problem"))
 
 
 @pytest.mark.both_qt

@@ -67,13 +67,22 @@ def plain_path(url: str) -> str:
     return local.toLocalFile() if local.isLocalFile() else url
 
 
+def context_of(item: QtCore.QObject) -> QtQml.QQmlContext | None:
+    """Return an object's QML context; None without one, and after the end of its engine.
+
+    Every use of a context crashes once the engine is destroyed, except for this question.
+    """
+    context = QtQml.QQmlEngine.contextForObject(item)
+    return context if context is not None and context.isValid() else None
+
+
 def declared_at(item: QtCore.QObject) -> Caller:
     """Return where QML declares an object, or the first one around it that QML has made.
 
     QML does not say the line. It is found in the file: by the type, if only one object is of it, or
     by its id; 0 otherwise.
     """
-    while (context := QtQml.QQmlEngine.contextForObject(item)) is None:
+    while (context := context_of(item)) is None:
         above = item.parent()
         if above is None:
             return Caller("<python>", 0, "")

@@ -12,7 +12,7 @@ from rosglass.errors import ConversionError, Error
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.from_js import elements_from_js, numpy
 from rosglass.qml.engine.js_values import fraction, number_from_text, qos_parts
-from rosglass.qml.engine.log import Caller, explain, log_from_qml, plain_path
+from rosglass.qml.engine.log import Caller, context_of, explain, log_from_qml, plain_path
 from rosglass.qml.engine.session import Session
 from rosglass.qml.engine.to_js import MessageConverter
 from rosglass.qt import QT6, QJSValue, QtCore, QtQml, Signal, Slot, is_alive
@@ -396,7 +396,7 @@ def runtime_of(item: QtCore.QObject) -> Runtime | None:
     if isinstance(item, QtQml.QQmlEngine):
         child = item.findChild(Runtime, _NAME)
         return child if isinstance(child, Runtime) else Runtime(item, Session.default())
-    context = QtQml.QQmlEngine.contextForObject(item)
+    context = context_of(item)
     # Not from the context's engine: PySide2 would treat the context as its owner and destroy it.
     found = context.contextProperty(_NAME) if context is not None else None
     return found if isinstance(found, Runtime) else None
