@@ -724,7 +724,7 @@ def _record(parser: argparse.ArgumentParser) -> None:
         "--compression",
         choices=("zstd", "lz4", "bz2", "none"),
         default="",
-        help="compression of the file (default: zstd; for .bag none, lz4 or bz2, default: none)",
+        help="zstd (default), lz4 or none; for FILE.bag none (default), lz4 or bz2",
     )
     parser.add_argument("-q", "--quiet", action="store_true", help="show no progress")
     add_connection_options(parser)
