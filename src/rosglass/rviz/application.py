@@ -433,7 +433,7 @@ def _attempt(step: Callable[[], object]) -> None:
     """Run a step of closing; log its errors, because a half-closed RViz crashes the process."""
     try:
         step()
-    except Exception:
+    except Exception:  # the other steps still have to run
         _log.exception("closing RViz: a step failed, continuing with the next one")
 
 

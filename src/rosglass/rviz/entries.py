@@ -273,7 +273,7 @@ class Entry(QtCore.QObject):
                 self.status(self._status_row, _WARN, self._failed)
             else:
                 self.attach(make(name))
-        except Exception as error:
+        except Exception as error:  # of the program's function that creates the overlay
             self._failed = str(error) or repr(error)
             self.status(self._status_row, _ERROR, self._failed)
 

@@ -127,7 +127,7 @@ def guarded(overlay: Overlay, activity: str) -> Iterator[None]:
     sys.excepthook = report
     try:
         yield
-    except Exception as error:
+    except Exception as error:  # an overlay's mistake ends neither RViz nor other overlays
         report(type(error), error, error.__traceback__)
     finally:
         sys.excepthook = before

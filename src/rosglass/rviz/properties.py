@@ -419,7 +419,7 @@ def log_errors(otherwise: Any = None) -> Callable[[Any], Any]:
         def call(*arguments: Any) -> Any:
             try:
                 return function(*arguments)
-            except Exception:
+            except Exception:  # C++ calls it: an error would end RViz
                 _log.exception("%s failed, RViz continues", function.__qualname__)
                 return otherwise
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.overlay.live_overlay import LiveOverlay
@@ -417,11 +417,10 @@ class QmlOverlay(QmlInput, LiveOverlay):
     ) -> None:
         super().__init__(file, session, name, **options)
         choice.expect(self.file)
-        try:
+        with ExitStack() as on_failure:
+            on_failure.callback(super().close)
             self._scene = Scene(choice.make(self.engine.importPathList()))
-        except Exception:
-            super().close()
-            raise
+            on_failure.pop_all()
         self._window = self._scene.window
         self._scene.changed.connect(self.changed)
         self._rviz_window: Window | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import time
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from rosglass.qt import QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Iterator
 
     from PySide6.QtQuick import QQuickWindow
 
@@ -107,7 +109,7 @@ class WindowRecorder(QtCore.QObject):
             if not self._later.isActive():
                 self._later.start(max(int(wait * 1000), 1))
             return
-        try:
+        with self._ending_on_errors():
             rhi, chain = self._window.rhi(), self._window.swapChain()
             if rhi is None or chain is None:
                 self._fail("the window is drawn without a graphics interface")
@@ -116,9 +118,6 @@ class WindowRecorder(QtCore.QObject):
             self._reading = QRhiReadbackResult()
             batch.readBackTexture(QRhiReadbackDescription(), self._reading)
             chain.currentFrameCommandBuffer().resourceUpdate(batch)
-        except Exception as error:
-            _log.exception("the window cannot be recorded")
-            self._fail(repr(error))
         self._taken = now
 
     @Slot()
@@ -130,7 +129,7 @@ class WindowRecorder(QtCore.QObject):
         reading, self._reading = self._reading, None
         if reading is None:
             return
-        try:
+        with self._ending_on_errors():
             rhi = self._window.rhi()
             if reading.data.isEmpty():
                 rhi.finish()
@@ -140,12 +139,17 @@ class WindowRecorder(QtCore.QObject):
             if rhi.isYUpInFramebuffer():
                 pixels = pixels[::-1]
             self._writer.add(pixels, self._taken, _FORMATS[QRhiTexture.Format(reading.format)])
-        except Exception as error:
-            _log.exception("the window cannot be recorded")
-            self._fail(repr(error))
         problem = self.status().problem
         if problem:
             self._fail(problem)
+
+    @contextlib.contextmanager
+    def _ending_on_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:  # of QRhi, whose interface changes: the window itself goes on
+            _log.exception("the window cannot be recorded")
+            self._fail(repr(error))
 
     def _fail(self, problem: str) -> None:
         if not self._problem:

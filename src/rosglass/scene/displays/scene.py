@@ -165,12 +165,7 @@ class Scene(SceneFrames):
                 QtCore.QTimer.singleShot(0, announce)
 
         display.destroyed.connect(forget)
-        try:
-            display.join(self)
-        except Exception as error:
-            # The others are shown all the same.
-            _log.exception("%s", display.label)
-            display.set_status("Setup", "error", repr(error))
+        self._call(display, lambda one: one.join(self), "Setup")
         self._announce_displays()
 
     def remove(self, display: Display) -> None:
@@ -320,15 +315,17 @@ class Scene(SceneFrames):
             if display.shown and self._call(display, job):
                 display.delete_status("Display")
 
-    def _call(self, display: Display, job: Callable[[Display], None]) -> bool:
+    def _call(
+        self, display: Display, job: Callable[[Display], None], line: str = "Display"
+    ) -> bool:
         """Return whether a job has not failed; otherwise the display says so, and others go on."""
         try:
             job(display)
         except TransformException as error:
             display.set_status("Transform", "error", str(error))
-        except Exception as error:
+        except Exception as error:  # the other displays are shown all the same
             _log.exception("%s", display.label)
-            display.set_status("Display", "error", repr(error))
+            display.set_status(line, "error", repr(error))
         else:
             return True
         return False

@@ -305,7 +305,7 @@ class SceneFrames(Element):
                 result = work(resources)
             except Error as error:
                 result = error
-            except Exception as error:
+            except Exception as error:  # files of robots never end the thread
                 _log.exception("loading failed")
                 result = Error(f"internal error: {error!r}")
             executor.post(lambda: take(result))

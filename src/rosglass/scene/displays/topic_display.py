@@ -416,7 +416,7 @@ class TopicDisplay(Display):
             self.show(item.data, pose, item.frame, item.stamp)
         except Error as error:
             self.set_status("Message", "error", str(error))
-        except Exception as error:
+        except Exception as error:  # messages of robots never end the event loop
             _log.exception("%s", self.label)
             self.set_status("Message", "error", f"this message could not be shown: {error!r}")
         self._show_age()

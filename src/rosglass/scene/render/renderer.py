@@ -9,6 +9,7 @@ An exception in :meth:`~SceneRenderer.render` must never leave an update batch o
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import time
 from collections import Counter
@@ -27,6 +28,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtQuick import QQuickRhiItemRenderer
 
+from rosglass.errors import Error
 from rosglass.scene.render.drawing import Labels, Lines, MapImage, Mesh, Points
 from rosglass.scene.render.graphics_device import (
     FRAME_BYTES,
@@ -557,6 +559,17 @@ _KINDS: dict[type, type[_OnDevice]] = {
 }
 
 
+@contextlib.contextmanager
+def _noting(failures: list[str]) -> Iterator[None]:
+    """Note why nothing can be drawn: C++ calls the renderer, and may be within a frame."""
+    try:
+        yield
+    except Exception as error:  # of a graphics driver, or of a program's drawable
+        if not isinstance(error, Error):
+            _log.exception("the 3D view")
+        failures.append(f"the 3D view cannot draw: {error}")
+
+
 class SceneRenderer(QQuickRhiItemRenderer):
     """Draws the frames of one view.
 
@@ -577,7 +590,7 @@ class SceneRenderer(QQuickRhiItemRenderer):
         #: Whether the frame is taken while drawing, as the GUI thread draws and took none before.
         self._takes_late = False
         #: Why there is no newer frame than the last one.
-        self._failure = ""
+        self._failures: list[str] = []
         #: Number of drawn frames.
         self.count = 0
         #: Whether the last frame shows everything; otherwise, the next ones upload the rest.
@@ -587,7 +600,8 @@ class SceneRenderer(QQuickRhiItemRenderer):
 
     def initialize(self, commands: QRhiCommandBuffer) -> None:  # noqa: ARG002 - Qt's signature
         """Start using a graphics interface, or a target of other samples."""
-        try:
+        failures: list[str] = []
+        with _noting(failures):
             target = self.renderTarget()
             device = self._device
             if device is not None and (device.rhi, device.samples) == (
@@ -598,8 +612,8 @@ class SceneRenderer(QQuickRhiItemRenderer):
                 return
             self.close()
             self._device = GraphicsDevice(self.rhi(), target.sampleCount(), target)
-        except Exception as error:
-            self._report(f"the 3D view cannot draw: {error}")
+        if failures:
+            self._report(failures[0])
 
     @property
     def draws_in_software(self) -> bool:
@@ -620,13 +634,11 @@ class SceneRenderer(QQuickRhiItemRenderer):
         self._take()
 
     def _take(self) -> None:
-        self._takes_late, self._failure = False, ""
-        try:
+        self._takes_late, self._failures = False, []
+        with _noting(self._failures):
             self._frame = self._take_frame()
-        except Exception as error:
-            _log.exception("the 3D view")
-            self._failure = f"the 3D view cannot draw: {error}"
-            self._report(self._failure)
+        if self._failures:
+            self._report(self._failures[0])
 
     def render(self, commands: QRhiCommandBuffer) -> None:
         """Draw the frame."""
@@ -635,39 +647,45 @@ class SceneRenderer(QQuickRhiItemRenderer):
         device, frame = self._device, self._frame
         if device is None or frame is None:
             return
-        problem = ""
+        ready: list[tuple[_Drawn, bool]] = []
+        problem, failures = "", list(self._failures)
         batch = device.rhi.nextResourceUpdateBatch()
-        try:
+        with _noting(failures):
             ready, problem = self._prepare(device, frame, batch)
-        except Exception as error:
-            _log.exception("the 3D view")
-            ready, problem = [], f"the 3D view cannot draw: {error}"
         began = time.perf_counter()
         target = self.renderTarget()
         commands.beginPass(target, frame.background, QRhiDepthStencilClearValue(1.0, 0), batch)
         try:
-            size = target.pixelSize()
-            viewport = QRhiViewport(0, 0, size.width(), size.height())
-            camera = frame.camera
-            depth = camera.projection[3] @ self._view_of(camera)
-            pixels = abs(float(camera.projection[1, 1])) * size.height() / 2
-            run = _Pass(commands, viewport, self._thinning(device, frame), depth, pixels)
-            for one, blend in ready:
-                try:
-                    one.draw(run, blend)
-                except Exception as error:  # noqa: PERF203 - the others are drawn all the same
-                    _log.exception("the 3D view")
-                    problem = f"{type(one.drawable).__name__} cannot be drawn: {error}"
-        except Exception as error:
-            _log.exception("the 3D view")
-            problem = f"the 3D view cannot draw: {error}"
+            with _noting(failures):
+                problem = self._draw(device, frame, commands, ready) or problem
         finally:
             commands.endPass()
         self._drawn_s = time.perf_counter() - began
         if not self.is_complete:
             self.update()
         self.count += 1
-        self._report(self._failure or problem)
+        self._report(failures[0] if failures else problem)
+
+    def _draw(
+        self,
+        device: GraphicsDevice,
+        frame: Frame,
+        commands: QRhiCommandBuffer,
+        ready: list[tuple[_Drawn, bool]],
+    ) -> str:
+        """Draw what is on the device; return the problem of a drawable, empty without one."""
+        size, camera, problem = self.renderTarget().pixelSize(), frame.camera, ""
+        viewport = QRhiViewport(0, 0, size.width(), size.height())
+        depth = camera.projection[3] @ self._view_of(camera)
+        pixels = abs(float(camera.projection[1, 1])) * size.height() / 2
+        run = _Pass(commands, viewport, self._thinning(device, frame), depth, pixels)
+        for one, blend in ready:
+            try:
+                one.draw(run, blend)
+            except Exception as error:  # noqa: PERF203 - the others are drawn all the same
+                _log.exception("the 3D view")
+                problem = f"{type(one.drawable).__name__} cannot be drawn: {error}"
+        return problem
 
     def _thinning(self, device: GraphicsDevice, frame: Frame) -> int:
         """Return k where only every k-th point is drawn, as the processor draws a moving view."""

@@ -515,7 +515,7 @@ class Tools(QtCore.QObject):
         except Error as error:
             text = f"{tool.label}: {error}"
             tool._log(text, logging.ERROR)
-        except Exception as error:
+        except Exception as error:  # a tool's mistake never ends the event loop
             text = f"{tool.label}: {error!r}"
             _log.exception("%s", tool.label)
         if is_alive(self):
