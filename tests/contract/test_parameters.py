@@ -229,7 +229,7 @@ def test_files_of_another_node(own, client, tmp_path):
         client.load(tmp_path / "empty.yaml")
 
 
-def test_a_closed_client_says_so(client, console):
+def test_closed_client_raises(client, console):
     client.close()
     client.close()
     assert not client.ready

@@ -116,7 +116,7 @@ def test_best_available_adapts_to_new_endpoints(robot, console, topic, eventuall
     assert subscription.problem == ""
 
 
-def test_a_publisher_of_what_is_available_serves_everybody(robot, console, topic, eventually):
+def test_publisher_with_best_available_serves_every_subscription(robot, console, topic, eventually):
     strict = console.create_subscription(topic, TEXT, qos=QoS.latched())
     loose = console.create_subscription(topic, TEXT, qos=BEST_EFFORT)
     eventually(lambda: len(robot.subscriptions(topic)) == 2)

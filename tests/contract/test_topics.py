@@ -48,9 +48,7 @@ def test_messages_come_once_and_in_order_and_none_is_lost_at_full_speed(link, ev
     assert subscription.statistics().dropped == 0
 
 
-def test_several_publishers_of_one_node_and_several_are_heard_in_order(
-    connect, robot, console, topic, eventually
-):
+def test_messages_of_several_publishers_arrive_in_order(connect, robot, console, topic, eventually):
     subscription = console.create_subscription(topic, TEXT, qos=KEEP_ALL)
     publishers = [
         node.create_publisher(topic, TEXT, KEEP_ALL)
@@ -67,7 +65,7 @@ def test_several_publishers_of_one_node_and_several_are_heard_in_order(
         assert own == [f"{index} {number}" for number in range(50)]
 
 
-def test_a_node_hears_itself(robot, topic, eventually):
+def test_node_receives_its_own_messages(robot, topic, eventually):
     subscription = robot.create_subscription(topic, TEXT)
     publisher = robot.create_publisher(topic, TEXT)
     eventually(lambda: publisher.subscription_count() == 1)
@@ -154,7 +152,7 @@ def test_a_sample_of_another_type_is_not_passed_on(link, robot, topic):
     assert subscription.wait(0.1) is None
 
 
-def test_a_publisher_that_is_closed_says_so(link, eventually):
+def test_closed_publisher_raises(link, eventually):
     publisher, subscription = link()
     publisher.close()
     publisher.close()

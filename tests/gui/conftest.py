@@ -171,7 +171,7 @@ class RealWorld:
         return rosglass.connect(url or self.url, name, namespace)
 
 
-# One world shows what differs between Qt versions.
+# ROS 1 alone shows the differences between Qt versions.
 @pytest.fixture(scope="module", params=["ros1"] if QT5 else ["zenoh", "ros1"])
 def url(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """URL that robot and operator share: of a Zenoh router, a DDS domain, or a ROS 1 master."""

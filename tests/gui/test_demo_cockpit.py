@@ -493,7 +493,7 @@ def test_a_robot_that_comes_back_does_not_drive_by_itself(
     assert robot.speed == 0.0
 
 
-def test_a_stop_that_the_robot_does_not_hear_is_said_and_kept(
+def test_stop_that_the_robot_does_not_receive_is_shown_and_kept(
     cockpit: CockpitProcess, robot: RobotSide
 ) -> None:
     robot.kill()

@@ -159,7 +159,7 @@ def test_ready_follows_the_received_values(live: Bench, wait: Any) -> None:
 
 
 @ROS2
-def test_a_change_that_went_unheard_is_found(ros2: Bench, wait: Any, monkeypatch: Any) -> None:
+def test_missed_change_is_found(ros2: Bench, wait: Any, monkeypatch: Any) -> None:
     """The first changes after a node appears may be missed."""
     from rosglass.qml.elements.parameter import ParameterLink
 

@@ -160,7 +160,7 @@ def test_a_command_is_not_held_for_longer_than_its_timeout(
     assert {message.linear.x for message in received} == {2.0}
 
 
-def test_a_publisher_that_is_let_go_sends_what_it_holds(
+def test_destroyed_publisher_sends_held_messages(
     running: Any, received: list, wait: Any, monkeypatch: Any
 ) -> None:
     go = threading.Event()

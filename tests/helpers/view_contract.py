@@ -240,7 +240,7 @@ def test_service_errors_say_why_the_camera_is_not_moved(
     assert near(view.eye, (4, 0, 3))
 
 
-def test_late_subscribers_hear_mode_and_tracked_frame(robot: Robot, camera: Camera) -> None:
+def test_late_subscribers_receive_mode_and_tracked_frame(robot: Robot, camera: Camera) -> None:
     view = camera.view
     view.set_mode(1, animate=False)
     view.track("map")

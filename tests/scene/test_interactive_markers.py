@@ -379,7 +379,7 @@ def test_a_button_is_clicked(
     assert len(server.events(BUTTON_CLICK)) == 1
 
 
-def test_a_click_that_reaches_no_server_says_so(
+def test_click_without_a_server_is_reported(
     bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand, caplog: Any
 ) -> None:
     display = show(
@@ -410,7 +410,7 @@ def test_a_click_that_reaches_no_server_says_so(
     assert len(server.events(BUTTON_CLICK)) == 1
 
 
-def test_a_drag_that_reaches_no_server_says_so(
+def test_drag_without_a_server_is_reported(
     bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
 ) -> None:
     display = show(marker(control(MOVE_AXIS)))
@@ -752,7 +752,7 @@ def test_a_server_that_is_gone_is_said_and_a_new_one_is_shown(
     assert display.root.alpha == 1
 
 
-def test_without_a_server_the_status_says_so(bench: SceneBench) -> None:
+def test_missing_server_is_in_the_status(bench: SceneBench) -> None:
     view = bench.load('InteractiveMarkersDisplay { topic: "/nowhere/update" }')
     (display,) = view.scene.displays
     bench.wait(lambda: "no server in /nowhere" in display.statusText)

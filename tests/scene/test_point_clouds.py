@@ -341,7 +341,7 @@ def test_a_cloud_of_too_many_points_is_an_error_in_words(
     assert shown.at(0, 0) == (255, 255, 255), "the last good cloud stays"
 
 
-def test_a_transformer_without_its_fields_says_so(show: Callable[..., Shown]) -> None:
+def test_transformer_without_its_fields_is_reported(show: Callable[..., Shown]) -> None:
     shown = show("PointCloud2", 'colorTransformer: "RGB8"')
     display = shown.send(cloud([(0, 0, 0, 1)], "ring"))
     assert display.statusLevel == "warn"

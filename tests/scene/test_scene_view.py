@@ -106,7 +106,7 @@ session.close()
 """
 
 
-def test_without_a_graphics_interface_it_says_so(tmp_path: Path) -> None:
+def test_missing_graphics_interface_is_reported(tmp_path: Path) -> None:
     file = tmp_path / "View.qml"
     file.write_text("import RosScene 1.0\nSceneView {}")
     env = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "QT_QUICK_BACKEND": "software"}

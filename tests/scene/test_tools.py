@@ -521,7 +521,7 @@ def test_a_finger_that_stays_after_a_pinch_sends_no_goal(bench: SceneBench, hand
     bench.wait(lambda: goals)
 
 
-def test_a_goal_without_subscribers_says_so(bench: SceneBench, hand: Hand, caplog: Any) -> None:
+def test_goal_without_subscribers_is_reported(bench: SceneBench, hand: Hand, caplog: Any) -> None:
     view = bench.load('SetGoalTool { topic: "/gaol_pose" }')
     listen(bench, "/goal_pose", "geometry_msgs/PoseStamped")
     view.tool = "SetGoal"
@@ -735,7 +735,7 @@ def test_a_config_does_not_silently_end_the_reports_of_a_goal(
     driver.goals.append(None)  # ends it
 
 
-def test_a_goal_to_an_action_without_server_says_so(
+def test_goal_to_an_action_without_server_is_reported(
     bench: SceneBench, hand: Hand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')

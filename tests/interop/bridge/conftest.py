@@ -1,4 +1,4 @@
-"""Fixtures for tests of bridges: both worlds with real peers, and ways to be between them."""
+"""Fixtures for tests of bridges: ROS 1 and ROS 2 with real peers, and bridges between them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def router() -> Iterator[Router]:
 
 @pytest.fixture
 def connect(master: Any, router: Router) -> Iterator[Callable[..., Node]]:
-    """Connect to a world: ``connect("ros1", name)`` or ``connect("ros2", name)``."""
+    """Connect to one side: ``connect("ros1", name)`` or ``connect("ros2", name)``."""
     nodes: list[Node] = []
 
     def connect(world: str, name: str, url: str = "", *, described: bool = False) -> Node:

@@ -117,7 +117,7 @@ def test_nothing_comes_back(bridge, connect):
     """Two bridges beside each other: each message arrives once, nowhere twice."""
     first, second = bridge(["*"]), bridge(["*"])
     one, two = connect("ros1", "echo_one"), connect("ros2", "echo_two")
-    # Both worlds publish the topic, and listen to it.
+    # ROS 1 and ROS 2 nodes both publish and subscribe.
     ends = [node.create_publisher("/echo", STRING, QoS(depth=100)) for node in (one, two)]
     ears = [node.create_subscription("/echo", STRING, qos=QoS(depth=1000)) for node in (one, two)]
 
@@ -345,7 +345,7 @@ def test_a_ros2_client_that_is_not_ours(bridge, start_peer, router, rospy_peer, 
 
 
 def test_a_chain_of_bridges(bridge, connect, start_master):
-    """Relayed topics are not relayed back by a bridge to a third network."""
+    """A second bridge relays topics of the first one on to a third network."""
     far = start_master().url
     bridge(["*"])
     bridge(["*"], urls=(far, ""))
@@ -360,8 +360,8 @@ def test_a_chain_of_bridges(bridge, connect, start_master):
 
 
 @pytest.mark.parametrize("kind", ["ros1", "dds"])
-def test_other_pairs_of_worlds(bridge, connect, router, request, kind):
-    """Between worlds of one ROS messages pass as they are, those of unknown types, too."""
+def test_bridges_between_two_masters_or_two_ros_2_networks(bridge, connect, router, request, kind):
+    """Between networks of one ROS version, messages pass unchanged, also those of unknown types."""
     if kind == "ros1":
         ours, other = "", request.getfixturevalue("start_master")().url
         near, world = connect("ros1", "pair_near"), "ros1"
@@ -441,7 +441,7 @@ def test_untranslatable_type_is_logged_once(bridge, connect, caplog):
 
 
 def test_closing(bridge, connect):
-    """In any order, twice, with the worlds gone."""
+    """In any order, twice, with both networks gone."""
     made = bridge(["*"], ["*"])
     one, two = connect("ros1", "close_one"), connect("ros2", "close_two")
     one.create_publisher("/closing", STRING).publish(data="x")

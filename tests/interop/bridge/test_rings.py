@@ -25,7 +25,7 @@ def test_three_worlds_in_a_ring(bridge, connect, start_master):
     third = start_master().url
     rules = (["/ring->"], ["/ask->"])
     back = (["/ring<-"], ["/ask<-"])
-    # From the first master to the router, to the third world, and back to the first.
+    # From the first master to the router, to the third network, and back to the first.
     first = connect("ros1", "first").url
     made = [
         bridge(*rules),
@@ -62,7 +62,7 @@ def test_three_worlds_in_a_ring(bridge, connect, start_master):
 
 
 def test_two_commands_there_and_back(master, router, connect, start_program):
-    """Two bridges between the same worlds, one each way, whatever they are called."""
+    """Two bridges between the same networks, one each way, whatever they are called."""
     url = master.url
     command = (sys.executable, "-m", "rosglass.cli", "bridge", "--topic", "/circle->")
     for name, urls in (("there", (url, router.url)), ("back", (router.url, url))):

@@ -68,7 +68,7 @@ def test_rosservice_and_rosconsole_see_and_set_our_levels(node, tool):
 @pytest.mark.parametrize(
     ("kind", "logger", "plan"), [("rospy", "rosout", {"level": "info"}), ("roscpp", "ros", {})]
 )
-def test_we_hear_the_log_and_see_the_levels_of_others(node, request, kind, logger, plan):
+def test_log_and_levels_of_other_nodes_are_received(node, request, kind, logger, plan):
     peer = request.getfixturevalue(f"{kind}_peer")
     heard: list = []
     node.create_subscription("/rosout", None, heard.append, 100)

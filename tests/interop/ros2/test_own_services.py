@@ -32,7 +32,7 @@ WORLDS = {"zenoh": "zenoh", "zenoh client": "zenoh", "dds": "cyclonedds"}
 
 @pytest.fixture(scope="module", params=list(WORLDS))
 def new_url(request, router, ros_domains):
-    """Return addresses in one world, each in a domain of its own."""
+    """Return URLs of one middleware, each with a domain of its own."""
     if importlib.util.find_spec(WORLDS[request.param]) is None:
         pytest.skip(f'needs pip install "rosglass[{request.param.split()[0]}]"')
     domains = random.SystemRandom().sample(ros_domains, 10)

@@ -96,7 +96,7 @@ def in_background(job: object) -> tuple[threading.Thread, list[object]]:
     return thread, results
 
 
-def test_sleeping_while_simulated_time_stands_still_says_so_once(clock: Clock, caplog) -> None:
+def test_sleeping_while_simulated_time_stands_still_is_logged_once(clock: Clock, caplog) -> None:
     clock.simulate(True)
     clock.advance(seconds(10))
     thread, results = in_background(lambda: clock.sleep(2.0))

@@ -111,7 +111,7 @@ def test_a_job_that_hangs_does_not_hang_closing(dispatcher, monkeypatch, caplog)
     go_on.set()
 
 
-def test_listeners_hear_every_value_until_they_close():
+def test_listeners_get_every_value_until_they_close():
     listeners = Listeners()
     seen = []
     handle = listeners.add(seen.append, IMMEDIATE)
@@ -123,7 +123,7 @@ def test_listeners_hear_every_value_until_they_close():
     assert seen == [1, 2]
 
 
-def test_merging_listeners_hear_the_newest_value_once(dispatcher):
+def test_merging_listeners_get_the_newest_value_once(dispatcher):
     listeners = Listeners(merge=True)
     go_on, seen = threading.Event(), []
     dispatcher.post(lambda: go_on.wait(30))

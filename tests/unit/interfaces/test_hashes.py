@@ -208,7 +208,7 @@ def test_empty_messages_are_described_with_their_placeholder(standard: Library) 
 
 
 @pytest.mark.parametrize(("function", "ros"), [(md5, 2), (rihs01, 1), (type_description, 1)])
-def test_hashes_of_the_other_world(
+def test_hashes_of_the_other_ros_version(
     standard: Library, function: Callable[[Definition], object], ros: int
 ) -> None:
     definition = standard.definition("std_msgs/String", ros)

@@ -78,7 +78,7 @@ def test_spellings_of_names() -> None:
     assert ros1_name("a/msg/B") == ros1_name("a/B") == "a/B"
 
 
-def test_bad_world(library: Library) -> None:
+def test_invalid_ros_version_is_rejected(library: Library) -> None:
     with pytest.raises(UnsupportedError, match="ros must be 1 or 2, got 3"):
         library.definition("std_msgs/String", 3)
 

@@ -97,7 +97,7 @@ class Rosbags:
     def _dtype(self, base: str) -> Any:
         if base == "string" or "/" in base or base in TIMES:
             return None
-        # Fault 2: rosbags has one byte for both worlds, ROS 1's.
+        # Fault 2: rosbags has one byte in both ROS versions, ROS 1's.
         return _NUMPY.get(base) or getattr(np, integer_type(base, 1))
 
     def _one(self, field: Field, value: Any) -> Any:

@@ -281,7 +281,7 @@ def test_nonsense_arguments_are_errors() -> None:
 
 
 @pytest.mark.parametrize("ros", [1, 2])
-def test_types_of_one_world_travel_in_the_others_format(ros: int) -> None:
+def test_types_of_one_ros_version_travel_in_the_format_of_the_other(ros: int) -> None:
     kind = load("sensor_msgs/msg/JointState", ros=ros)
     message = kind.create(name=["a"], position=[1.0])
     for wire in ("cdr", "ros1"):

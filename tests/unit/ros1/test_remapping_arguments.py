@@ -75,7 +75,7 @@ def test_other_arguments_are_kept() -> None:
     assert Arguments.parse([*others, "a:=b"]).others == tuple(others)
 
 
-def test_one_command_line_for_both_worlds() -> None:
+def test_ros_2_arguments_work_in_ros_1() -> None:
     parsed = parse(
         *("--ros-args", "-r", "chatter:=talk", "--remap", "__ns:=/arm", "--param", "speed:=2"),
         *("-r", "__node:=left", "--", "rest"),

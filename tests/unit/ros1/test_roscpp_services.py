@@ -83,7 +83,7 @@ def test_log_levels_are_listed_and_set(connect, eventually):
         change.call({"logger": "rosout", "level": "info"}, timeout=30)
 
 
-def test_the_clock_is_the_systems_again_once_a_new_master_says_so(connect, master, eventually):
+def test_clock_follows_a_new_master_back_to_system_time(connect, master, eventually):
     master.tree["use_sim_time"] = 1
     node = connect("arm", own_services=False)
     eventually(lambda: node.clock.is_simulated)

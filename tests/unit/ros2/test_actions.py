@@ -691,7 +691,7 @@ def test_an_incomplete_server_is_named(client, middleware, eventually):
     eventually(lambda: problem in client.problem)
 
 
-def test_a_goal_whose_client_closes_while_it_asks_for_the_result_says_so(node, client, server):
+def test_goal_whose_client_closes_while_it_fetches_the_result_raises(node, client, server):
     goal = client.send_goal({"order": 99})
     assert goal.acceptance.result(30)
     # What a closing client's services answer may come before the goal hears of the end.

@@ -131,9 +131,7 @@ class Package:
 
 
 @pytest.mark.parametrize("version", ["11.0.1", "11.3.0"])
-def test_another_version_of_the_series_is_used_with_a_word_on_what_is_lost(
-    monkeypatch, caplog, version
-):
+def test_other_version_of_the_series_is_used_with_a_warning(monkeypatch, caplog, version):
     package = Package(version)
     monkeypatch.setattr(cyclone, "distribution", lambda _: package)
     assert "libddsc" in cyclone.library_path()

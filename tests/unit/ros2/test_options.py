@@ -102,7 +102,7 @@ def test_locators():
         ({"ROS_MASTER_URI": "http://r:11311", "ROS_DISTRO": "jazzy"}, "dds://"),
     ],
 )
-def test_the_environment_chooses_the_world(env, url):
+def test_environment_chooses_the_middleware(env, url):
     assert default_url(env) == url
 
 

@@ -307,6 +307,6 @@ def test_files_that_cannot_be_used_are_named(tmp_path: Path) -> None:
         read(binary)
 
 
-def test_an_empty_file_has_nothing_for_anybody() -> None:
+def test_empty_file_has_no_parameters() -> None:
     assert parse("").for_node("/n") == {}
     assert parse("# only a comment\n").entries == ()

@@ -498,7 +498,7 @@ def test_closing_ends_it(when: str, join: Callable[..., Ros2Node]) -> None:
         user.fetch_type(STATE)
 
 
-def test_giving_up_asks_no_more(
+def test_cancelled_fetch_sends_no_more_requests(
     join: Callable[..., Ros2Node], eventually: Callable[..., Any]
 ) -> None:
     user = join("cockpit", serves=False)

@@ -1,4 +1,4 @@
-"""The value: composing, inverting, applying, messages of both worlds."""
+"""The value: composing, inverting, applying, messages of ROS 1 and ROS 2."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_immutable() -> None:
 
 
 @pytest.mark.parametrize("ros", [1, 2])
-def test_messages_of_both_worlds(ros: int) -> None:
+def test_messages_of_ros_1_and_ros_2(ros: int) -> None:
     kind = rosglass.load("geometry_msgs/msg/TransformStamped", ros)
     message = kind.create(MAP_BASE.to_dict(ros))  # type: ignore[union-attr]
     assert Transform.from_message(message) == MAP_BASE
