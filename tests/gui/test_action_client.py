@@ -235,7 +235,7 @@ def test_cancelling_without_a_node_is_reported(
     root.cancelAll()
     failures = json.loads(root.failures())
     assert [who for who, _ in failures] == ["goal", "client"]
-    assert "no further news of it will arrive" in failures[0][1]
+    assert "no further updates of it will arrive" in failures[0][1]
     assert failures[0][1] in caplog.text
 
 

@@ -246,9 +246,9 @@ def test_changes_while_it_runs(live: Bench, robot: Robot, wait: Any) -> None:
     [
         ("rate: -1", "rate -1 is not from 0 to 120"),
         ("rate: NaN", "rate nan is not"),
-        ('encoding: "yuv"', "encoding 'yuv' is none of rgb8, bgr8, rgba8, mono8"),
-        ('transport: "theora"', "transport 'theora' is none of raw, compressed"),
-        ('format: "gif"', "format 'gif' is none of jpeg, png"),
+        ('encoding: "yuv"', "encoding 'yuv' is not one of rgb8, bgr8, rgba8, mono8"),
+        ('transport: "theora"', "transport 'theora' is not one of raw, compressed"),
+        ('format: "gif"', "format 'gif' is not one of jpeg, png"),
         ("quality: 0", "quality 0 is not from 1 to 100"),
         ("size: Qt.size(-3, 100)", "size -3x100 is not from 1"),
         ("cameraInfo: 7", "cameraInfo must be an object"),

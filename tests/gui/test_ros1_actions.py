@@ -134,7 +134,7 @@ def test_the_interface_shuts_down(
     assert actionlib.of("state")[-1] == [True, DONE, GOAL_LOST]
     assert actionlib.run("[handle.expired, client.connected]") == [True, False]
     actionlib.run("handle.cancel()")
-    assert "no further news of it will arrive" in caplog.text
+    assert "no further updates of it will arrive" in caplog.text
 
 
 def test_misuse_throws(actionlib: Client, counter: Counter, wait: Any) -> None:

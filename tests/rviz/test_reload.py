@@ -255,7 +255,7 @@ def test_errors_from_the_start_are_shown_until_they_are_mended(
     assert not overlay.loaded
     assert "Ui.qml:1:" in overlay.problem
     assert seen(grab(), 20, 24) != GREY
-    assert "shown once they are mended" in error_panels()[0].property("heading")
+    assert "shown once they are fixed" in error_panels()[0].property("heading")
     assert not mouse("press", 90, 400)
     mouse("release", 90, 400)
     file.write_text(IMPORTS + BLUE_UI)

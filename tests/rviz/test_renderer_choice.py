@@ -129,7 +129,7 @@ def test_the_choice_of_the_user_takes_precedence(
     other = {"QT_QUICK_BACKEND": "software"} if wanted == "opengl" else {}
     said = chosen("--overlay", file, "--renderer", wanted, **other)
     assert f"overlays are drawn by {name}" in said
-    assert "it was asked for" in said
+    assert "it was requested" in said
     assert ("is not drawn" in said) == (wanted == "software")
 
 

@@ -641,7 +641,7 @@ def open_bag(path: str | os.PathLike[str]) -> Bag:
     """Open a recording: an MCAP file, a ROS 2 bag (folder, ``.mcap`` or ``.db3``), a ROS 1 bag.
 
     Raises:
-        BagError: It does not exist, is damaged, or is none of these.
+        BagError: It does not exist, is damaged, or has none of these formats.
     """
     if not isinstance(path, (str, os.PathLike)):
         raise BagError(f"a recording is given by its path, not by {path!r:.80}")

@@ -128,7 +128,7 @@ def _list(args: argparse.Namespace, first: Node, second: Node, rules: list[list[
         for text in (*one.notes, *((f"not relayed: {one.problem}",) if one.problem else ())):
             print(style(f"    {text}", "dim"))
     if not found:
-        note("nothing is there that could be relayed; rosglass doctor looks why")
+        note("nothing is there that could be relayed; rosglass doctor finds out why")
     return 0
 
 

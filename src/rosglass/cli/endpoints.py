@@ -142,4 +142,4 @@ def print_names(
     for name, types in spelling.items():
         print(name + (style(f" [{', '.join(types)}]", "dim") if args.types else ""))
     if not found:
-        note(f"there are no {what}s here; rosglass doctor looks why")
+        note(f"there are no {what}s here; rosglass doctor finds out why")

@@ -74,7 +74,7 @@ def list_nodes(args: argparse.Namespace) -> int:
     for name in found:
         print(name)
     if not found:
-        note("there are no other nodes here; rosglass doctor looks why")
+        note("there are no other nodes here; rosglass doctor finds out why")
     return 0
 
 

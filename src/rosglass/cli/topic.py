@@ -94,7 +94,7 @@ def list_topics(args: argparse.Namespace) -> int:
         print(topic + shown)
     if not found:
         graph = shown_url(args.url or "this graph")
-        note(f"there are no topics on {graph}; rosglass doctor looks why")
+        note(f"there are no topics on {graph}; rosglass doctor finds out why")
     return 0
 
 

@@ -257,7 +257,7 @@ class GoalHandle(QtCore.QObject):
         """Ask the server to cancel the goal; one that is still unsent is never sent."""
         caller = self._runtime.caller()
         if self._status is GoalStatus.LOST:
-            reason = f"no further news of it will arrive: {self._reason}"
+            reason = f"no further updates of it will arrive: {self._reason}"
             log_from_qml("", logging.WARNING, f"{self._label} is not cancelled: {reason}", caller)
             self.cancelFailed.emit(reason)
             return
@@ -440,7 +440,7 @@ def report_cancelling(
         return str(error)
     if answer.result(0).accepted:
         return ""
-    reason = answer.result(0).reason or "the server cancels nothing, and does not say why"
+    reason = answer.result(0).reason or "the server refused without giving a reason"
     log_from_qml("", refused, f"{what} is not cancelled: {reason}", caller)
     return reason
 

@@ -425,7 +425,7 @@ class ValueFunctions(GraphSingleton):
             parts: dict[str, MessageType] = getattr(found, "parts", {"message": found})
             first = {"message": "message", "service": "request", "action": "goal"}[wanted]
             if first not in parts:
-                raise InvalidNameError(f"{type_name} is no {wanted} type")
+                raise InvalidNameError(f"{type_name} is not a {wanted} type")
             message: Message = parts[first].create()
             return self._runtime.message(message, self.DIALECT)
         except Error as error:

@@ -299,7 +299,7 @@ def close_network() -> None:
     network: Any = optional("QtNetwork")
     if network is None:
         _log.warning(
-            "the network is open to interfaces, for Qt's QtNetwork is missing; on Debian: "
+            "the network is open to interfaces, as Qt's QtNetwork is missing; on Debian: "
             "sudo apt install python3-pyside2.qtnetwork"
         )
         return

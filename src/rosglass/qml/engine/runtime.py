@@ -111,7 +111,7 @@ class Host(QtCore.QObject):
             whole: list[Any] = elements_from_js(values, kind)
             packed = np.array(whole, np.dtype(kind)).tobytes()
         except (Error, OverflowError, TypeError, ValueError) as error:
-            self._runtime.throw(f"these are no {kind}: {error}")
+            self._runtime.throw(f"these are not {kind}: {error}")
             return None
         return QtCore.QByteArray(packed)
 

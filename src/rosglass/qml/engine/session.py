@@ -201,8 +201,8 @@ _RETRY = 1000
 _FORGOTTEN = 3000
 #: Error text before init(), with advice.
 NOT_INITIALIZED = (
-    'no node was asked for: call Ros2.init("name"), or Ros.init("name") with Ros 1.0, '
-    "e.g. in Component.onCompleted"
+    'the interface has not called Ros2.init("name"), or Ros.init("name") with Ros 1.0; '
+    "call it e.g. in Component.onCompleted"
 )
 #: Maximum delay of connecting; an interface without a window has no first frame.
 _MAX_DEFER_MS = 1000
@@ -630,7 +630,7 @@ class Session(QtCore.QObject):
     def _remind(self) -> None:
         """Log once that elements wait for a node but init() was not called."""
         if self._ticking > 0 and not self._closed and not self.is_initialized:
-            _log.warning("nothing is received or sent: %s", NOT_INITIALIZED)
+            _log.warning("not connected: %s", NOT_INITIALIZED)
             self.forgotten.emit()
 
     def _start(self) -> None:

@@ -257,7 +257,7 @@ class Watchdog(QtCore.QObject):
                 try:
                     self._look_closely(end)
                 except Exception:  # noqa: BLE001 - in a thread of its own
-                    _log.exception("internal error: the screen is watched no longer")
+                    _log.exception("internal error: the watchdog has stopped")
                     return
 
     def _look(self) -> float:

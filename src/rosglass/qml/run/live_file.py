@@ -260,10 +260,10 @@ _REGISTERED_BY = {"RosScene": "rosglass.scene.app.modules", "RosglassDemo": "ros
 #: The QML file of a closable item that is only as large as its text.
 PANEL = Path(__file__).with_name("ErrorPanel.qml")
 #: Headings of an ErrorView, for what is below it.
-ERRORS = "This interface has errors. It is shown once they are mended."
+ERRORS = "This interface has errors. It is shown once they are fixed."
 ERRORS_BELOW = "The interface below is the last one without errors."
 NO_NODE = "This interface has no node: nothing is received or sent."
-SCRIPT_ENDED = "The interface below goes on, but a part of what it should have done was left out."
+SCRIPT_ENDED = "The interface below continues, but a function of it was interrupted."
 
 
 class ErrorView:

@@ -291,7 +291,7 @@ class RendererChoice:
 
     def _choose(self, import_paths: Sequence[str]) -> tuple[str, str]:
         if self._wanted != "auto":
-            return self._wanted, "it was asked for"
+            return self._wanted, "it was requested"
         taken = taken_renderer()
         if taken:
             return taken, _BEFORE

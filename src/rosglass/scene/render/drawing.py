@@ -180,7 +180,7 @@ class Points(Drawable):
             Error: The style is unknown.
         """
         if style is not None and style not in self.STYLES:
-            raise Error(f"style {style!r} is none of {', '.join(self.STYLES)}")
+            raise Error(f"style {style!r} is not one of {', '.join(self.STYLES)}")
         before = (self.style, self.size, self.size_by_depth, self.coloring, self.alpha)
         self.style = self.style if style is None else style
         self.size = self.size if size is None else finite_number("size", size)
