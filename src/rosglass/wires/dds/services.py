@@ -104,11 +104,12 @@ class _Route:
     """How a request was sent; its call refers to it until the reply is of no use.
 
     Attributes:
-        key: The scheme and the number that identify its reply; None before it was sent.
+        key: The number that identifies its reply: the call's with a header, else the negative one
+            of the request; None before it was sent.
         readers: Handles of the servers' readers that have been linked ever since it was sent.
     """
 
-    key: tuple[Scheme, int] | None = None
+    key: int | None = None
     readers: frozenset[int] = frozenset()
 
 
@@ -126,7 +127,7 @@ class DdsRequester(Requester):
         #: A random number in place of rmw_cyclonedds's instance handle; unique in the domain.
         self._id = secrets.randbits(64)
         #: The sent calls, by what identifies their replies; the `route` of each is a `_Route`.
-        self._calls: dict[tuple[Scheme, int], PendingCall] = {}
+        self._calls: dict[int, PendingCall] = {}
         self._sequence = 0
         #: Handles of the linked servers' request readers; they change with a reconnection.
         self._linked: dict[Scheme, frozenset[int]] = {}
@@ -238,9 +239,9 @@ class DdsRequester(Requester):
                     return False
                 raise
             self._sequence = sequence + 1 if sequence >= 0 else -1
-            number = pending.number if scheme is Scheme.HEADER else self._sequence
-            route.key, route.readers = (scheme, number), self._linked.get(scheme, frozenset())
-            self._calls[route.key] = pending
+            route.key = key = pending.number if scheme is Scheme.HEADER else -self._sequence
+            route.readers = self._linked.get(scheme, frozenset())
+            self._calls[key] = pending
         return True
 
     def _on_received(self, origin: Origin, data: bytes | memoryview) -> bool:
@@ -291,10 +292,10 @@ class DdsRequester(Requester):
         """Return the open call that a reply answers, and the scheme that identifies it."""
         found, scheme = None, Scheme.IDENTITY
         if related is not None and related.guid in (self.gid, self._endpoints.reader.guid):
-            found = self._calls.get((scheme, related.sequence))
+            found = self._calls.get(-related.sequence)
         if found is None and (header := unpack_header(data)) is not None and header[0] == self._id:
             scheme = Scheme.HEADER
-            found = self._calls.get((scheme, header[1]))
+            found = self._calls.get(header[1])
         return None if found is None else (found, scheme)
 
     def _drop(self, pending: PendingCall) -> bool:
