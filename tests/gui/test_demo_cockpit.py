@@ -180,7 +180,8 @@ def test_a_key_drives_and_letting_go_stops(cockpit: CockpitProcess, robot: Robot
     zeros = [c for c in robot.commands if c[1] == c[2] == 0]
     assert len(moving) > 5, robot.commands
     gaps = np.diff([c[0] for c in moving])
-    assert np.median(gaps) == pytest.approx(0.05, abs=0.04), "20 commands a second"
+    # 20 commands a second, fewer on a busy machine; the robot stops after half a second without.
+    assert 0.01 < np.median(gaps) < 0.4
     assert len(zeros) >= 3, "one lost message must not keep the robot going"
     assert zeros[0][0] - released < 1
     eventually(lambda: time.monotonic() - robot.commands[-1][0] > 0.15, "then others may drive")

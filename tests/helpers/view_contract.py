@@ -317,7 +317,7 @@ def test_changing_ones_mind_while_they_are_made_leaves_them_there(
         view.settings.topics = True
     camera.wait(lambda: camera.services.is_open or camera.services.problem)
     assert not camera.services.problem
-    assert robot.namespace + "move_eye" in str(camera.session.node.services())
+    camera.wait(lambda: robot.namespace + "move_eye" in str(camera.session.node.services()))
 
 
 def test_catkin_makes_the_types_that_we_speak(robot: Robot, camera: Camera) -> None:
