@@ -9,6 +9,7 @@ import pytest
 
 from rosglass.comm.graph import ConnectionState
 from rosglass.errors import Error
+from rosglass.qml.engine.callbacks import Answers
 
 if TYPE_CHECKING:
     from conftest import Bench
@@ -289,6 +290,17 @@ def test_open_requests_are_limited(live: Bench, wait: Any, monkeypatch: Any) -> 
         calls[2].result()
     assert root.property("open").toVariant() == [1, 2]
     assert [call.done() for call in calls[:2]] == [False, False]
+
+
+def test_queued_request_counts_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It waits until its server exists, and is asked then."""
+    monkeypatch.setattr("rosglass.qml.engine.callbacks._MAX_OPEN", 1)
+    answers, queue = Answers(None, "the handler"), []
+    answer = answers.later(queue, answers.open)
+    queue.pop()()
+    assert not answer.done()
+    answers.give_up()
+    assert "closed before it answered" in str(answer.exception())
 
 
 @pytest.mark.both_qt

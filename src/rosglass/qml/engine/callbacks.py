@@ -171,6 +171,7 @@ class Answers:
         def run() -> None:
             if future.done():
                 return
+            self._pending.discard(future)  # what `ask` opens takes its place
             try:
                 answer = ask()
             except Error as error:
