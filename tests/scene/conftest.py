@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import uuid
+from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,9 +20,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
     from qt_waiting import QtWaiting
+    from scene_mouse import Hand
 
 HAVE_QT6 = find_spec("PySide6") is not None
 SIZE = (400, 300)
+UPRIGHT = (0, 0, 0, 1)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -119,9 +122,63 @@ class SceneBench:
         rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
         return rows[:, : image.width() * 3].reshape(image.height(), image.width(), 3).copy()
 
+    def pixel(self, x: int = 200, y: int = 200) -> tuple[int, ...]:
+        """Return the color of a pixel of the window."""
+        return tuple(int(part) for part in self.picture()[y, x])
+
     def drawn(self) -> int:
         """Return how many frames were drawn."""
         return self.view.pictures_drawn()
+
+    @cached_property
+    def moving(self) -> Any:
+        """The robot's publisher of `move`."""
+        from rosglass.tf import TransformBroadcaster
+
+        return TransformBroadcaster(self.robot)
+
+    def place(
+        self, *children: str, at: Any = (0, 0, 0), turn: Any = UPRIGHT, parent: str = "map"
+    ) -> None:
+        """Publish static transforms."""
+        from rosglass import Time
+        from rosglass.tf import StaticTransformBroadcaster, Transform
+
+        StaticTransformBroadcaster(self.robot).send_transform(
+            [Transform(at, turn, Time(1), parent, child) for child in children]
+        )
+
+    def move(
+        self, child: str, at: Any, stamp: Any, *, turn: Any = UPRIGHT, parent: str = "map"
+    ) -> None:
+        """Publish a transform of a time, in seconds or a `Time`."""
+        from rosglass import Time
+        from rosglass.tf import Transform
+
+        stamp = Time.from_parts(stamp, 0) if isinstance(stamp, int) else stamp
+        self.moving.send_transform(Transform(at, turn, stamp, parent, child))
+
+    def publisher(self, topic: str, message_type: str, qos: Any = 10) -> Any:
+        """Return a publisher of the robot, once the view subscribes."""
+        publisher = self.robot.create_publisher(topic, message_type, qos)
+        self.wait(publisher.subscription_count)
+        return publisher
+
+    def latch(self, topic: str, message_type: str, message: dict[str, Any]) -> Any:
+        """Publish a message that later subscribers receive as well; return the publisher."""
+        from rosglass.comm import QoS
+
+        publisher = self.robot.create_publisher(topic, message_type, QoS.latched())
+        publisher.publish(message)
+        return publisher
+
+    def send(self, publisher: Any, message: dict[str, Any], receiver: Any) -> Any:
+        """Publish a message, and return its receiver once it has received and shown it."""
+        before = receiver.received
+        publisher.publish(message)
+        self.wait(lambda: receiver.received > before)
+        self.wait.settled(self.session)
+        return receiver
 
     def close(self) -> None:
         from rosglass.qt import send_deferred_deletes
@@ -144,6 +201,13 @@ def bench(make_bench: Callable[[str], SceneBench]) -> Iterator[SceneBench]:
     made = make_bench("")
     yield made
     made.close()
+
+
+@pytest.fixture
+def hand(bench: SceneBench) -> Hand:
+    from scene_mouse import Hand
+
+    return Hand(bench)
 
 
 @pytest.fixture

@@ -213,8 +213,7 @@ Visualization Manager:
     view = bench.load()
     assert view.load_config(file) == []
     outer = view.scene.find("Outer")
-    publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
-    bench.wait(publisher.subscription_count)
+    publisher = bench.publisher("/plan", "nav_msgs/Path")
     outer.enabled = False
     bench.wait(lambda: not publisher.subscription_count())
     outer.enabled = True

@@ -39,27 +39,17 @@ class Robot:
     """Publishes a description, joint states and the frames of the links."""
 
     def __init__(self, bench: SceneBench) -> None:
-        from rosglass.comm import Durability, QoS
-        from rosglass.tf import StaticTransformBroadcaster
+        from rosglass.comm import QoS
 
         self.bench = bench
-        latched = QoS(1, durability=Durability.TRANSIENT_LOCAL)
         self.descriptions = bench.robot.create_publisher(
-            "/robot_description", "std_msgs/String", qos=latched
+            "/robot_description", "std_msgs/String", QoS.latched()
         )
         self.states = bench.robot.create_publisher("/joint_states", STATES)
-        self.static = StaticTransformBroadcaster(bench.robot)
 
     def place(self, *links: str, prefix: str = "") -> None:
-        from rosglass import Time
-        from rosglass.tf import Transform
-
-        self.static.send_transform(
-            [
-                Transform((float(at), 0.0, 0.0), (0, 0, 0, 1), Time(1), "map", f"{prefix}{link}")
-                for at, link in enumerate(links)
-            ]
-        )
+        for at, link in enumerate(links):
+            self.bench.place(f"{prefix}{link}", at=(float(at), 0.0, 0.0))
 
     def send(self, efforts: dict[str, float], **fields: Any) -> None:
         self.bench.wait(self.states.subscription_count)
@@ -286,16 +276,10 @@ def test_a_broken_description_is_an_error_until_a_good_one_comes(
 
 
 def test_efforts_are_where_the_joints_were_at_their_time(bench: SceneBench, robot: Robot) -> None:
-    from rosglass import Time
-    from rosglass.tf import Transform, TransformBroadcaster
-
     display = add(bench, robot)
-    moving = TransformBroadcaster(bench.robot)
 
     def move(second: int) -> None:
-        at = (float(second), 0.0, 0.0)
-        stamp = Time.from_parts(second, 0)
-        moving.send_transform(Transform(at, (0, 0, 0, 1), stamp, "map", "upper"))
+        bench.move("upper", (float(second), 0.0, 0.0), second)
 
     def stamped(nanoseconds: int) -> dict[str, Any]:
         return {"stamp": {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}}

@@ -51,12 +51,9 @@ class Robot:
     """Publishes images, CameraInfo and transforms."""
 
     def __init__(self, bench: SceneBench, topic: str = "/front/image") -> None:
-        from rosglass.tf import TransformBroadcaster
-
         self.bench = bench
         self.images = bench.robot.create_publisher(topic, "sensor_msgs/Image")
         self.infos = bench.robot.create_publisher("/front/camera_info", "sensor_msgs/CameraInfo")
-        self.broadcaster = TransformBroadcaster(bench.robot)
 
     def show(self, display: Any, *color: int, **fields: Any) -> None:
         """Publish an image until the display shows it."""
@@ -82,17 +79,12 @@ class Robot:
 
     def send_info_until_received(self, display: Any, message: dict[str, Any]) -> None:
         """Publish a CameraInfo until the display has received it, and shows what follows."""
-        before = display.infos.received
-        self.bench.wait(lambda: self.infos.publish(message) or display.infos.received > before)
-        self.bench.wait.settled(self.bench.session)
+        self.bench.wait(self.infos.subscription_count)
+        self.bench.send(self.infos, message, display.infos)
 
     def place(self, seconds: int = 7, y: float = 0.0) -> None:
         """Publish the camera's transform."""
-        from rosglass import Time
-        from rosglass.tf import Transform
-
-        stamp = Time.from_parts(seconds, 0)
-        self.broadcaster.send_transform(Transform((0, y, 1), OPTICAL, stamp, "map", "camera"))
+        self.bench.move("camera", (0, y, 1), seconds, turn=OPTICAL)
 
 
 @pytest.fixture
@@ -105,10 +97,6 @@ def load(bench: SceneBench) -> Callable[..., tuple[Any, Robot]]:
     return loaded
 
 
-def pixel(bench: SceneBench, x: int = 200, y: int = 200) -> tuple[int, ...]:
-    return tuple(int(part) for part in bench.picture()[y, x])
-
-
 def close(a: tuple[int, ...], b: tuple[int, ...], tolerance: int = 3) -> bool:
     return max(abs(int(x) - int(y)) for x, y in zip(a, b, strict=True)) <= tolerance
 
@@ -116,13 +104,13 @@ def close(a: tuple[int, ...], b: tuple[int, ...], tolerance: int = 3) -> bool:
 def test_a_panel_shows_the_images(bench: SceneBench, load: Callable[..., Any]) -> None:
     display, robot = load(IMAGE + PANEL)
     robot.show(display)
-    assert pixel(bench) == (0, 255, 255)
+    assert bench.pixel() == (0, 255, 255)
     assert display.statusLevel == "ok", display.statusText
     robot.show(display, 255, 0, 255)
-    assert pixel(bench) == (255, 0, 255)
+    assert bench.pixel() == (255, 0, 255)
     display.enabled = False
     bench.wait(lambda: endpoint_of(display) is None)
-    assert pixel(bench, 390, 290) == (48, 48, 48), "the panel is hidden"
+    assert bench.pixel(390, 290) == (48, 48, 48), "the panel is hidden"
 
 
 def test_without_a_panel_nothing_is_received(bench: SceneBench, load: Callable[..., Any]) -> None:
@@ -147,7 +135,7 @@ def test_a_panel_that_is_destroyed_ends_the_stream(
     bench.wait(lambda: robot.images.subscription_count() == 0)
     bench.view.fixedFrame = "map"
     robot.show(display)
-    bench.wait(lambda: pixel(bench, 200, 290) == (0, 255, 255))
+    bench.wait(lambda: bench.pixel(200, 290) == (0, 255, 255))
 
 
 def test_a_display_that_is_removed_leaves_no_panel(
@@ -155,9 +143,9 @@ def test_a_display_that_is_removed_leaves_no_panel(
 ) -> None:
     display, robot = load(CAMERA + "id: main; ImagePanels { anchors.fill: parent; view: main }")
     robot.show(display)
-    bench.wait(lambda: pixel(bench, 100, 280) == (0, 255, 255))
+    bench.wait(lambda: bench.pixel(100, 280) == (0, 255, 255))
     bench.view.scene.remove(display)
-    bench.wait(lambda: pixel(bench, 100, 280) == (48, 48, 48))
+    bench.wait(lambda: bench.pixel(100, 280) == (48, 48, 48))
     bench.wait(lambda: robot.images.subscription_count() == 0)
 
 
@@ -168,7 +156,7 @@ def test_image_that_is_not_live_fades(bench: SceneBench, load: Callable[..., Any
     bench.wait(lambda: display.statusLevel == "warn")
     assert "its publisher is gone; the last one is of" in display.statusText
     assert display.stale
-    assert close(pixel(bench), (0, 89, 89)), "35 % of the picture, on black"
+    assert close(bench.pixel(), (0, 89, 89)), "35 % of the picture, on black"
 
 
 def test_old_image_fades_though_its_publisher_lives(
@@ -242,7 +230,7 @@ def test_compressed_images_are_shown(bench: SceneBench, load: Callable[..., Any]
     _, data = cv2.imencode(".png", np.full((HEIGHT, WIDTH, 3), (255, 0, 255), np.uint8))
     message = {"format": "rgb8; png compressed ", "data": data.reshape(-1)}
     bench.wait(lambda: publisher.publish(message) or shown_of(display) is not None)
-    assert pixel(bench) == (255, 0, 255)
+    assert bench.pixel() == (255, 0, 255)
     assert robot.images.subscription_count() == 0, "raw pictures are not received"
 
 
@@ -311,7 +299,7 @@ def test_the_scene_fits_the_image(bench: SceneBench, camera: tuple[Any, Robot]) 
     display, robot = camera
     display.imageRendering = "background"
     assert display.statusLevel == "ok", display.statusText
-    assert pixel(bench, 50, 250) == (0, 0, 255), "the picture is behind"
+    assert bench.pixel(50, 250) == (0, 0, 255), "the picture is behind"
     assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
     # The image is placed at its own time.
     robot.place(10, y=0.4)
@@ -350,7 +338,7 @@ def test_single_image_is_shown_alone_until_its_transform_is_known(
     robot.images.publish(picture_of((0, 0, 255), seconds=7))
     # Nothing else is received, and no transform.
     bench.wait(lambda: shown_of(display) is not None)
-    assert pixel(bench) == (0, 0, 255)
+    assert bench.pixel() == (0, 0, 255)
     assert "Transform: no transform from [camera]" in display.statusText
     robot.place(7)
     robot.place(8)
@@ -361,13 +349,13 @@ def test_the_image_is_behind_over_or_both(bench: SceneBench, camera: tuple[Any, 
     display, _ = camera
     x, y = (round(part) for part in expected())
     display.imageRendering = "background"
-    red = pixel(bench, x, y)
+    red = bench.pixel(x, y)
     assert red[2] < 60 < red[0]
     display.imageRendering = "overlay"
-    assert close(pixel(bench, 50, 250), (0, 0, 127))
-    assert close(pixel(bench, x, y), (red[0] // 2, 0, 127), 40)
+    assert close(bench.pixel(50, 250), (0, 0, 127))
+    assert close(bench.pixel(x, y), (red[0] // 2, 0, 127), 40)
     display.imageRendering, display.overlayAlpha = "background and overlay", 1.0
-    assert pixel(bench, x, y) == (0, 0, 255)
+    assert bench.pixel(x, y) == (0, 0, 255)
     display.imageRendering, display.zoomFactor = "background", 0.5
     picture = bench.picture()
     assert tuple(picture[20, 200]) == (0, 0, 0), "around the picture"
@@ -381,7 +369,7 @@ def test_displays_can_be_hidden_in_the_camera(bench: SceneBench, camera: tuple[A
     display.imageRendering = "background"
     display.hiddenDisplays = ["PointStamped"]
     x, y = (round(part) for part in expected())
-    assert pixel(bench, x, y) == (0, 0, 255)
+    assert bench.pixel(x, y) == (0, 0, 255)
 
 
 @pytest.mark.parametrize(
@@ -400,7 +388,7 @@ def test_a_bad_camera_info_draws_no_scene(
     robot.send_info(display, "error", **fields)
     assert text in display.statusText
     x, y = (round(part) for part in expected())
-    assert pixel(bench, x, y) == (0, 0, 255), "only the picture"
+    assert bench.pixel(x, y) == (0, 0, 255), "only the picture"
     robot.send_info(display)
     assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
 
@@ -421,7 +409,7 @@ def test_without_camera_info_the_image_is_shown_alone(
     robot.show(display)
     assert "no CameraInfo received on /front/camera_info" in display.statusText
     assert display.camera_for(400, 300) is None
-    assert pixel(bench, 200, 290) == (0, 255, 255)
+    assert bench.pixel(200, 290) == (0, 255, 255)
 
 
 def test_without_a_transform_the_image_waits_and_is_then_shown_alone(
@@ -523,7 +511,7 @@ def test_panels_over_a_view_are_moved_and_resized(
 
     display, robot = load(IMAGE + "id: main; ImagePanels { anchors.fill: parent; view: main }")
     robot.show(display)
-    bench.wait(lambda: pixel(bench, 100, 240) == (0, 255, 255))
+    bench.wait(lambda: bench.pixel(100, 240) == (0, 255, 255))
     left = Qt.MouseButton.LeftButton
 
     def drag(*points: tuple[int, int]) -> QRectF:
@@ -537,7 +525,7 @@ def test_panels_over_a_view_are_moved_and_resized(
     assert drag((205, 255), (215, 260), (235, 275)) == QRectF(30, 125, 210, 155)
     assert drag((60, 130), (20, 100), (5, 130)) == QRectF(0, 125, 210, 155), "not out of the view"
     bench.view.scene.add("Grid")
-    bench.wait(lambda: pixel(bench, 205, 260) == (0, 255, 255))
+    bench.wait(lambda: bench.pixel(205, 260) == (0, 255, 255))
 
 
 @pytest.mark.parametrize("size", [(400, 300), (1200, 250), (300, 900)])

@@ -111,11 +111,6 @@ def server(bench: SceneBench) -> MarkerServer:
 
 
 @pytest.fixture
-def hand(bench: SceneBench) -> Hand:
-    return Hand(bench)
-
-
-@pytest.fixture
 def show(bench: SceneBench, server: MarkerServer) -> Callable[..., Any]:
     """Shows markers from above, or at an angle, and returns the display."""
 
@@ -249,11 +244,7 @@ def test_a_box_is_tumbled(show: Callable[..., Any], hand: Hand, mode: int) -> No
 def test_drags_in_perspective_and_in_frames_that_are_turned(
     bench: SceneBench, show: Callable[..., Any], hand: Hand, frame: str
 ) -> None:
-    from rosglass import Time
-    from rosglass.tf import Transform, TransformBroadcaster
-
     tilt = (0.3, -0.5, 0.1, 0.8)
-    broadcaster = TransformBroadcaster(bench.robot)
     display = show(
         marker(
             control(MOVE_AXIS),
@@ -263,7 +254,7 @@ def test_drags_in_perspective_and_in_frames_that_are_turned(
         ),
         view="Orbit",
     )
-    broadcaster.send_transform(Transform((1, -1, 0.5), tilt, Time.from_parts(1, 0), "map", "tool"))
+    bench.move("tool", (1, -1, 0.5), 1, turn=tilt)
     bench.wait(lambda: shown(display).root.visible)
     arm = shown(display)
 
@@ -617,14 +608,11 @@ def test_markers_fade_when_their_frame_is_not_updated(
     bench: SceneBench, show: Callable[..., Any], monkeypatch: Any
 ) -> None:
     from rosglass.scene.displays import display as displays
-    from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 0.5)
-    broadcaster = TransformBroadcaster(bench.robot)
 
     def move() -> None:
-        stamp = bench.robot.now()
-        broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, "map", "gripper"))
+        bench.move("gripper", (0, 0, 0), bench.robot.now())
 
     display = show(
         marker(control(MOVE_AXIS), header={"frame_id": "gripper"}),
@@ -642,14 +630,8 @@ def test_markers_fade_when_their_frame_is_not_updated(
 def test_markers_of_a_frame_follow_it_and_stamped_ones_stay(
     bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
 ) -> None:
-    from rosglass import Time
-    from rosglass.tf import Transform, TransformBroadcaster
-
-    broadcaster = TransformBroadcaster(bench.robot)
-
     def move(x: float, sec: int) -> None:
-        stamp = Time.from_parts(sec, 0)
-        broadcaster.send_transform(Transform((x, 0, 0), (0, 0, 0, 1), stamp, "map", "tool"))
+        bench.move("tool", (x, 0, 0), sec)
 
     display = show(
         marker(control(BUTTON, boxes=True), header={"frame_id": "tool"}),

@@ -31,38 +31,22 @@ def show(bench: SceneBench) -> Callable[..., Any]:
     """Publishes maps and updates, and returns the display once it has received them."""
     view = bench.load('view: "TopDownOrtho"; MapDisplay { topic: "/map"; alpha: 1 }')
     (display,) = view.scene.displays
-    kinds = {
-        "/map": bench.robot.create_publisher("/map", "nav_msgs/OccupancyGrid"),
-        "/map_updates": bench.robot.create_publisher(
-            "/map_updates", "map_msgs/OccupancyGridUpdate"
-        ),
+    publishers = {
+        "/map": bench.publisher("/map", "nav_msgs/OccupancyGrid"),
+        "/map_updates": bench.publisher("/map_updates", "map_msgs/OccupancyGridUpdate"),
     }
-    for publisher in kinds.values():
-        bench.wait(publisher.subscription_count)
-
-    def send(message: dict[str, Any], topic: str = "/map") -> Any:
-        before = display.received
-        kinds[topic].publish(message)
-        bench.wait(lambda: display.received > before)
-        bench.wait.settled(bench.session)
-        return display
-
-    return send
-
-
-def middle(bench: SceneBench) -> tuple[int, ...]:
-    return tuple(int(part) for part in bench.picture()[155, 205])
+    return lambda message, topic="/map": bench.send(publishers[topic], message, display)
 
 
 def test_a_map_is_drawn_in_rviz_colors(bench: SceneBench, show: Callable[..., Any]) -> None:
     display = show(grid(20, 10, 100))
     assert display.statusLevel == "ok", display.statusText
     assert (display.columns, display.rows, display.resolution) == (20, 10, 1.0)
-    assert middle(bench) == (0, 0, 0)
+    assert bench.pixel(205, 155) == (0, 0, 0)
     display.colorScheme = "costmap"
-    assert middle(bench) == (255, 0, 255)
+    assert bench.pixel(205, 155) == (255, 0, 255)
     show(grid(20, 10, -1))
-    assert middle(bench) == (0x70, 0x89, 0x86)
+    assert bench.pixel(205, 155) == (0x70, 0x89, 0x86)
 
 
 PART = {"header": {"frame_id": "map"}, "x": 10, "y": 4, "width": 2, "height": 2}
@@ -78,9 +62,7 @@ def test_updates_come_from_any_publisher_whatever_the_policies_of_the_map(
         'MapDisplay { topic: "/map"; durability: "Transient Local"; reliability: "Reliable" }'
     )
     (display,) = view.scene.displays
-    bench.robot.create_publisher("/map", "nav_msgs/OccupancyGrid", QoS.latched()).publish(
-        grid(20, 10, 0)
-    )
+    bench.latch("/map", "nav_msgs/OccupancyGrid", grid(20, 10, 0))
     updates = bench.robot.create_publisher(
         "/map_updates",
         "map_msgs/OccupancyGridUpdate",
@@ -120,8 +102,7 @@ def test_updates_follow_the_topic_of_the_map(bench: SceneBench) -> None:
     assert display.load_settings(saved) == []
     display.topic = "/costmap"
     bench.wait(lambda: endpoint_of(display) is not None)
-    updates = bench.robot.create_publisher("/costmap_updates", "map_msgs/OccupancyGridUpdate")
-    bench.wait(updates.subscription_count)
+    bench.publisher("/costmap_updates", "map_msgs/OccupancyGridUpdate")
     kept = display.save_settings(saved)["Update Topic"]
     assert kept == {"Depth": 5, "Durability Policy": "Volatile", "Value": "/costmap_updates"}
     assert display.save_settings()["Update Topic"] == "/costmap_updates"
@@ -132,7 +113,7 @@ def test_updates_follow_the_topic_of_the_map(bench: SceneBench) -> None:
 
 def test_an_update_changes_a_part(bench: SceneBench, show: Callable[..., Any]) -> None:
     show(grid(20, 10, 0))
-    assert middle(bench) == (255, 255, 255)
+    assert bench.pixel(205, 155) == (255, 255, 255)
     display = show({**PART, "data": np.full(4, 100, np.int8)}, "/map_updates")
     assert display.statusLevel == "ok", display.statusText
     assert display.cells[4:6, 10:12].tolist() == [[100, 100], [100, 100]]
@@ -159,7 +140,7 @@ def test_a_bad_map_is_an_error_in_words(
     display = show(message)
     assert display.statusLevel == "error"
     assert text in display.statusText
-    assert middle(bench) == (0, 0, 0), "the last good map stays"
+    assert bench.pixel(205, 155) == (0, 0, 0), "the last good map stays"
 
 
 def test_palettes_have_the_colors_of_rviz() -> None:

@@ -45,17 +45,9 @@ def show(bench: SceneBench) -> Callable[..., Any]:
     """Publishes markers, and returns the display once it has received them."""
     view = bench.load('MarkerArrayDisplay { topic: "/markers" }')
     (display,) = view.scene.displays
-    publisher = bench.robot.create_publisher("/markers", "visualization_msgs/MarkerArray")
-    bench.wait(publisher.subscription_count)
+    publisher = bench.publisher("/markers", "visualization_msgs/MarkerArray")
 
-    def send(*markers: dict[str, Any]) -> Any:
-        before = display.received
-        publisher.publish({"markers": list(markers)})
-        bench.wait(lambda: display.received > before)
-        bench.wait.settled(bench.session)
-        return display
-
-    return send
+    return lambda *markers: bench.send(publisher, {"markers": list(markers)}, display)
 
 
 def drawables(display: Any) -> list[Any]:
@@ -349,20 +341,15 @@ def test_hidden_namespaces_are_saved(show: Callable[..., Any]) -> None:
 def test_markers_wait_for_their_frame_and_locked_ones_follow_it(
     bench: SceneBench, show: Callable[..., Any]
 ) -> None:
-    from rosglass import Time
-    from rosglass.tf import Transform, TransformBroadcaster
-
     display = show(
         marker(1, header={"frame_id": "arm"}, frame_locked=True),
         marker(2, 1, header={"frame_id": "arm"}),
     )
     assert "no transform from [arm]" in display.statusText
     assert drawables(display) == []
-    broadcaster = TransformBroadcaster(bench.robot)
 
     def move(x: float, sec: int) -> None:
-        stamp = Time.from_parts(sec, 0)
-        broadcaster.send_transform(Transform((x, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+        bench.move("arm", (x, 0, 0), sec)
 
     move(1.0, 1)
     bench.wait(lambda: xs(display) == [1.0, 1.0])
@@ -381,7 +368,6 @@ def test_locked_markers_fade_when_their_frame_is_not_updated(
     bench: SceneBench, show: Callable[..., Any], monkeypatch: Any
 ) -> None:
     from rosglass.scene.displays import display as displays
-    from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 0.5)
     display = show(
@@ -389,11 +375,9 @@ def test_locked_markers_fade_when_their_frame_is_not_updated(
         marker(2, 1, header={"frame_id": "arm"}),
         marker(3, 2),
     )
-    broadcaster = TransformBroadcaster(bench.robot)
 
     def move() -> None:
-        stamp = bench.robot.now()
-        broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+        bench.move("arm", (0, 0, 0), bench.robot.now())
 
     def opacities() -> dict[int, float]:
         shapes = {BOX: 1, SPHERE: 2, CYLINDER: 3}
@@ -409,14 +393,6 @@ def test_locked_markers_fade_when_their_frame_is_not_updated(
     bench.wait(lambda: opacities()[1] < 1.0)
     display.setNamespaceEnabled("shapes", False)
     bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
-
-
-def send_static(node: Any, parent: str, child: str, x: float = 0.0) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
-    broadcaster = StaticTransformBroadcaster(node)
-    broadcaster.send_transform(Transform((x, 0, 0), (0, 0, 0, 1), Time(0), parent, child))
 
 
 def test_all_markers_of_an_array_are_applied_in_order(show: Callable[..., Any]) -> None:
@@ -460,7 +436,7 @@ def test_a_waiting_marker_is_replaced_and_deleted_by_newer_ones(
     display = show(marker(1), marker(1, header=away), marker(2, 1, header=away))
     assert len(drawables(display)) == 1  # the older one, until the newer one has a place
     show(marker(3), marker(2, 1, action=DELETE), marker(2, 2, header=away))
-    send_static(bench.robot, "map", "arm", 2.0)
+    bench.place("arm", at=(2.0, 0, 0))
     bench.wait(lambda: xs(display) == [0.0, 2.0])
     assert display.statusLevel == "ok", display.statusText
 
@@ -474,7 +450,7 @@ def test_markers_that_wait_are_bounded_and_their_lines_too(
     assert len(display.status_lines) <= 52
     assert "Transform [f10]: no transform from [f10]" in display.statusText
     assert "Markers: and 960 more" in display.statusText
-    send_static(bench.robot, "map", "f1009")
+    bench.place("f1009")
     bench.wait(lambda: len(drawables(display)) == 1)
     show(*(marker(99, number) for number in range(1010)))
     assert len(display.status_lines) <= 52
@@ -501,7 +477,7 @@ def test_a_marker_of_a_time_that_never_comes_is_dropped(
     monkeypatch.setattr(module, "_MAX_WAIT_S", 0.0)
     header = {"frame_id": "arm", "stamp": {"sec": 5, "nanosec": 0}}
     display = show(marker(1, header=header), marker(1, 1, header={"frame_id": "leg"}))
-    send_static(bench.robot, "map", "other")
+    bench.place("other")
     bench.wait(lambda: "shapes/0: it was dropped after 0 s: no trans" in display.statusText)
     assert "Transform [arm]" not in display.statusText
     # Any time is good for this one.
@@ -511,7 +487,7 @@ def test_a_marker_of_a_time_that_never_comes_is_dropped(
 def test_markers_without_transform_to_a_new_fixed_frame_are_hidden(
     bench: SceneBench, show: Callable[..., Any]
 ) -> None:
-    send_static(bench.robot, "map", "arm", 2.0)
+    bench.place("arm", at=(2.0, 0, 0))
     view = bench.view
     bench.wait(lambda: "arm" in view.scene.frames())
     display = show(
@@ -542,8 +518,7 @@ def test_a_display_makes_no_timer_per_message(bench: SceneBench, show: Callable[
 def test_markers_of_a_publisher_that_is_gone_are_faded(bench: SceneBench) -> None:
     view = bench.load('MarkerArrayDisplay { topic: "/markers" }')
     (display,) = view.scene.displays
-    publisher = bench.robot.create_publisher("/markers", "visualization_msgs/MarkerArray")
-    bench.wait(publisher.subscription_count)
+    publisher = bench.publisher("/markers", "visualization_msgs/MarkerArray")
     assert display.stale
     publisher.publish({"markers": [marker(1)]})
     bench.wait(lambda: not display.stale)

@@ -59,16 +59,11 @@ class Shown:
         self.bench = bench
         body = f'view: "TopDownOrtho"; {kind}Display {{ topic: "/cloud"; size: 1; {settings} }}'
         (self.display,) = bench.load(body).scene.displays
-        self.publisher = bench.robot.create_publisher("/cloud", self.display.MESSAGES[0])
-        bench.wait(self.publisher.subscription_count)
+        self.publisher = bench.publisher("/cloud", self.display.MESSAGES[0])
 
     def send(self, message: dict[str, Any]) -> Any:
         """Publish a message, and return the display once it has received it."""
-        display, before = self.display, self.display.received
-        self.publisher.publish(message)
-        self.bench.wait(lambda: display.received > before)
-        self.bench.wait.settled(self.bench.session)
-        return display
+        return self.bench.send(self.publisher, message, self.display)
 
     def at(self, x: float, y: float, picture: Any = None) -> tuple[int, ...]:
         """Return the color of the frame at a position on the ground."""
@@ -144,12 +139,8 @@ def test_points_have_packed_colors_with_alpha(show: Callable[..., Shown]) -> Non
 
 
 def test_an_axis_is_that_of_the_fixed_frame(bench: SceneBench, show: Callable[..., Shown]) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     # The sensor lies on its side: its x is up.
-    turned = Transform((0, 0, 5), (0, -math.sqrt(0.5), 0, math.sqrt(0.5)), Time(), "map", "sensor")
-    StaticTransformBroadcaster(bench.robot).send_transform(turned)
+    bench.place("sensor", at=(0, 0, 5), turn=(0, -math.sqrt(0.5), 0, math.sqrt(0.5)))
     shown = show("PointCloud2", 'colorTransformer: "AxisColor"')
     bench.wait(lambda: "sensor" in bench.view.scene.frames())
     rows = [(x, x * 4 - 4, 0) for x in (0, 1, 2)]
@@ -194,8 +185,7 @@ def test_boxes_and_spheres_have_the_light_of_rviz(show: Callable[..., Shown]) ->
 def test_a_square_faces_the_eye_across_to_y(bench: SceneBench) -> None:
     view = bench.load('PointCloud2Display { topic: "/cloud"; size: 3 }')
     (display,) = view.scene.displays
-    publisher = bench.robot.create_publisher("/cloud", "sensor_msgs/PointCloud2")
-    bench.wait(publisher.subscription_count)
+    publisher = bench.publisher("/cloud", "sensor_msgs/PointCloud2")
     publisher.publish(cloud([(0, 0, 0)]))
     bench.wait(lambda: display.points == 1)
     # RViz's first view looks from (-x, -y) down at it: the square is seen turned by 35 degrees.
@@ -213,8 +203,7 @@ def test_squares_of_one_vertex_look_as_those_of_four(
 
     body = f'view: "{view}"; PointCloud2Display {{ topic: "/cloud"; style: "{style}" }}'
     (display,) = bench.load(body).scene.displays
-    publisher = bench.robot.create_publisher("/cloud", "sensor_msgs/PointCloud2")
-    bench.wait(publisher.subscription_count)
+    publisher = bench.publisher("/cloud", "sensor_msgs/PointCloud2")
     random = np.random.default_rng(0)
     rows = [*zip(*random.uniform(-4, 4, (3, 400)), random.uniform(0, 1, 400), strict=True)]
     publisher.publish(cloud(rows, "intensity"))
@@ -285,15 +274,11 @@ def test_clouds_stay_for_the_decay_time(bench: SceneBench, show: Callable[..., S
 def test_each_cloud_counts_that_has_waited_for_its_transform(
     bench: SceneBench, show: Callable[..., Shown]
 ) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     shown = show("PointCloud2", 'decayTime: 1000; colorTransformer: "FlatColor"')
     for x in (-3, 0, 3):
         display = shown.send(cloud([(x, 0, 0)], header={"frame_id": "late"}))
     assert display.points == 0
-    late = Transform((0, 0, 0), (0, 0, 0, 1), Time(), "map", "late")
-    StaticTransformBroadcaster(bench.robot).send_transform(late)
+    bench.place("late")
     bench.wait(lambda: display.points == 3)
 
 
@@ -426,15 +411,10 @@ def test_a_laser_scan_is_drawn(show: Callable[..., Shown]) -> None:
 def test_a_laser_scan_is_corrected_by_the_motion_of_the_scanner(
     bench: SceneBench, show: Callable[..., Shown]
 ) -> None:
-    from rosglass import Time
-    from rosglass.tf import Transform, TransformBroadcaster
-
     shown = show("LaserScan")
-    broadcaster = TransformBroadcaster(bench.robot)
 
     def move(seconds: int, x: float) -> None:
-        at = Transform((x, 0, 0), (0, 0, 0, 1), Time.from_parts(seconds, 0), "map", "laser")
-        broadcaster.send_transform(at)
+        bench.move("laser", (x, 0, 0), seconds)
 
     move(10, 0.0)
     bench.wait(lambda: "laser" in bench.view.scene.frames())
@@ -493,11 +473,7 @@ class Camera:
     """A display of depth images, and the publishers of a camera that looks down from above."""
 
     def __init__(self, bench: SceneBench, settings: str = "") -> None:
-        from rosglass import Time
-        from rosglass.tf import StaticTransformBroadcaster, Transform
-
-        down = Transform((0, 0, 10), (1, 0, 0, 0), Time(), "map", "camera")
-        StaticTransformBroadcaster(bench.robot).send_transform(down)
+        bench.place("camera", at=(0, 0, 10), turn=(1, 0, 0, 0))
         self.bench = bench
         body = f'DepthCloudDisplay {{ topic: "/camera/depth/image_raw"; {settings} }}'
         (self.display,) = bench.load(f'view: "TopDownOrtho"; {body}').scene.displays
@@ -515,12 +491,9 @@ class Camera:
 
     def send(self, topic: str, message: dict[str, Any], second: int = 1) -> Any:
         header = {"frame_id": "camera", "stamp": {"sec": second, "nanosec": 0}}
-        publisher, queue = self.publishers[topic], queue_of(self.display)
-        before = queue.received
-        self.bench.wait(publisher.subscription_count)
-        publisher.publish({"header": header, **message})
-        self.bench.wait(lambda: queue.received > before)
-        self.bench.wait.settled(self.bench.session)
+        self.bench.wait(self.publishers[topic].subscription_count)
+        message = {"header": header, **message}
+        self.bench.send(self.publishers[topic], message, queue_of(self.display))
         return self.display
 
     def depth(self, values: list[int], second: int = 1, **more: Any) -> Any:
@@ -695,19 +668,15 @@ def test_hidden_points_stay_until_they_time_out(bench: SceneBench) -> None:
 
 
 def test_hidden_points_are_dropped_when_the_camera_moves(bench: SceneBench) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     camera = Camera(bench, "occlusionCompensation: true")
     camera.send("/camera/depth/camera_info", CAMERA)
     near = [2000, 2000, 0, 4000]
     camera.depth([4000] * 4, 1)
     assert camera.depth(near, 2).points == 6
-    broadcaster = StaticTransformBroadcaster(bench.robot)
 
     def move(height: float, roll: float = math.pi) -> None:
         turn = (math.sin(roll / 2), 0, 0, math.cos(roll / 2))
-        broadcaster.send_transform(Transform((0, 0, height), turn, Time(), "map", "camera"))
+        bench.place("camera", at=(0, 0, height), turn=turn)
         scene = bench.view.scene
         bench.wait(lambda: abs(scene.look_up("camera")[2, 3] - height) < 1e-6)
 

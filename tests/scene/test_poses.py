@@ -38,8 +38,7 @@ def show(bench: SceneBench) -> Callable[..., Any]:
     ) -> Any:
         view = bench.load()
         display = view.scene.add(display_type, topic="/shown", **settings)
-        publisher = bench.robot.create_publisher("/shown", message_type)
-        bench.wait(publisher.subscription_count)
+        publisher = bench.publisher("/shown", message_type)
         for number, message in enumerate(messages, 1):
             publisher.publish({"header": HEADER, **message})
             bench.wait(

@@ -31,25 +31,8 @@ URDF = """<robot name="rover">
 </robot>"""
 
 
-def send_transforms(bench: SceneBench, *children: str, prefix: str = "") -> Any:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
-    broadcaster = StaticTransformBroadcaster(bench.robot)
-    for child in children:
-        broadcaster.send_transform(
-            Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", f"{prefix}{child}")
-        )
-    return broadcaster
-
-
-def publish(bench: SceneBench, text: str, topic: str = "/robot_description") -> Any:
-    from rosglass.comm import Durability, QoS
-
-    qos = QoS(1, durability=Durability.TRANSIENT_LOCAL)
-    publisher = bench.robot.create_publisher(topic, "std_msgs/String", qos=qos)
-    publisher.publish({"data": text})
-    return publisher
+def publish(bench: SceneBench, text: str) -> Any:
+    return bench.latch("/robot_description", "std_msgs/String", {"data": text})
 
 
 def test_a_description_may_come_from_a_publisher_that_does_not_keep_it(bench: SceneBench) -> None:
@@ -71,7 +54,7 @@ def test_a_robot_is_shown_where_tf_has_its_links(bench: SceneBench) -> None:
     assert robot.robotName == "rover"
     bench.wait(lambda: "Link mast: no transform" in robot.statusText)
     assert shapes(robot) == set()
-    send_transforms(bench, "base_link", "mast")
+    bench.place("base_link", "mast")
     bench.wait(lambda: shapes(robot) == {BOX, CYLINDER})
     assert robot.statusLevel == "ok", robot.statusText
     assert "URDF: URDF parsed OK" in robot.statusText
@@ -94,7 +77,7 @@ def test_a_prefix_names_the_frames(bench: SceneBench) -> None:
     view = bench.load('RobotModelDisplay { tfPrefix: "/r1/" }')
     (robot,) = view.scene.displays
     publish(bench, URDF)
-    send_transforms(bench, "base_link", "mast", prefix="r1/")
+    bench.place("r1/base_link", "r1/mast")
     bench.wait(lambda: shapes(robot) == {BOX, CYLINDER})
 
 
@@ -146,7 +129,7 @@ def test_meshes_come_from_files_and_missing_ones_are_named(
         <visual><geometry><mesh filename="package://nowhere/gone.stl"/></geometry></visual>
         </link></robot>"""
     )
-    send = send_transforms(bench, "base_link")
+    bench.place("base_link")
     view = bench.load(
         f'RobotModelDisplay {{ descriptionSource: "File"; descriptionFile: "{urdf}" }}'
     )
@@ -180,7 +163,6 @@ def test_meshes_come_from_files_and_missing_ones_are_named(
     view.fixedFrame = "map"
     green = (bench.picture().astype(int) - (0, 255, 0)).clip(0).max(axis=2) < 30
     assert green.sum() > 100
-    send.close()
 
 
 STL = bytes(80) + struct.pack("<I12fH", 1, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 2, 0, 0)
@@ -263,7 +245,7 @@ def test_meshes_and_what_they_name_come_from_the_robot(bench: SceneBench) -> Non
     view = bench.load("RobotModelDisplay {}")
     (robot,) = view.scene.displays
     publish(bench, with_meshes("package://far/meshes/arm.obj", "package://far/meshes/gone.stl"))
-    send = send_transforms(bench, "base_link")
+    bench.place("base_link")
     bench.wait(lambda: len(list(robot.root.drawables())) == 1)
     ((mesh, _, _),) = robot.root.drawables()
     assert mesh.texture is not None
@@ -281,7 +263,6 @@ def test_meshes_and_what_they_name_come_from_the_robot(bench: SceneBench) -> Non
     view.reset()
     bench.wait(lambda: len(list(robot.root.drawables())) == 2)
     assert robot.statusLevel == "ok", robot.statusText
-    send.close()
     server.close()
 
 
@@ -294,12 +275,11 @@ def test_meshes_come_from_web_servers(bench: SceneBench) -> None:
         view = bench.load("RobotModelDisplay {}")
         (robot,) = view.scene.displays
         publish(bench, with_meshes(*[f"{web.url}/arm.stl"] * 3, f"{web.url}/gone.stl?token=1"))
-        send = send_transforms(bench, "base_link")
+        bench.place("base_link")
         bench.wait(lambda: len(list(robot.root.drawables())) == 3)
         assert sorted(path for path, _ in web.requests) == ["/arm.stl", "/gone.stl?token=1"]
         (line,) = (one for name, one in robot.status_lines.items() if name.startswith("Mesh"))
         assert f"{web.url}/gone.stl?token=1: the server answers 404 Not Found" in line.text
-        send.close()
 
 
 @pytest.mark.usefixtures("cache")
@@ -315,7 +295,7 @@ def test_a_web_server_that_was_down_is_asked_again(
         view.scene.ask_again_s = 0.1
         (robot,) = view.scene.displays
         publish(bench, with_meshes(f"{web.url}/arm.stl", f"{web.url}/hand.stl"))
-        send = send_transforms(bench, "base_link")
+        bench.place("base_link")
         bench.wait(lambda: len(web.requests) >= 4)
         line = robot.status_lines["Mesh arm.stl"]
         assert line.level == "error"
@@ -339,7 +319,6 @@ def test_a_web_server_that_was_down_is_asked_again(
         bench.wait(lambda: robot.statusText == "")
         robot.enabled = True
         bench.wait(lambda: len(list(robot.root.drawables())) == 1)
-        send.close()
 
 
 @pytest.mark.usefixtures("cache")
@@ -379,19 +358,16 @@ def test_settings_are_written_for_either_rviz(bench: SceneBench) -> None:
 def test_links_have_settings_of_their_own(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.scene.render.drawing import Lines
-    from rosglass.tf import Transform, TransformBroadcaster
 
     view = bench.load("RobotModelDisplay {}")
     (robot,) = view.scene.displays
     tip = '<joint name="k" type="fixed"><parent link="mast"/><child link="tip"/></joint>'
     publish(bench, URDF.replace("</robot>", f'<link name="tip"/>{tip}</robot>'))
     bench.wait(lambda: robot.links == ["base_link", "mast", "tip"])
-    broadcaster = TransformBroadcaster(bench.robot)
 
     def move(x: int) -> None:
         for link in robot.links:
-            now = Time(1 + x)
-            broadcaster.send_transform(Transform((x, 0, 0), (0, 0, 0, 1), now, "map", link))
+            bench.move(link, (x, 0, 0), Time(1 + x))
 
     def opacities() -> dict[Any, float]:
         return {
@@ -438,21 +414,17 @@ def test_links_have_settings_of_their_own(bench: SceneBench) -> None:
 
 
 def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any) -> None:
-    from rosglass import Time
     from rosglass.scene.displays import display
-    from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(display, "_FRAME_TIMEOUT_S", 0.5)
     view = bench.load("RobotModelDisplay {}")
     (robot,) = view.scene.displays
     publish(bench, URDF)
-    send_transforms(bench, "mast")
-    broadcaster = TransformBroadcaster(bench.robot)
+    bench.place("mast")
     sent = itertools.count(1)
 
     def move() -> bool:
-        stamp = Time.from_parts(next(sent), 0)
-        broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, "map", "base_link"))
+        bench.move("base_link", (0, 0, 0), next(sent))
         return shapes(robot) == {BOX, CYLINDER}
 
     bench.wait(move)
@@ -467,18 +439,16 @@ def test_a_robot_fades_when_one_of_its_joints_is_not_updated(
     bench: SceneBench, monkeypatch: Any
 ) -> None:
     from rosglass.scene.displays import display
-    from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(display, "_FRAME_TIMEOUT_S", 0.5)
     view = bench.load("RobotModelDisplay {}")
     (robot,) = view.scene.displays
     publish(bench, URDF)
-    broadcaster = TransformBroadcaster(bench.robot)
 
     def move(*links: tuple[str, str]) -> None:
         stamp = bench.robot.now()
         for parent, child in links:
-            broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, parent, child))
+            bench.move(child, (0, 0, 0), stamp, parent=parent)
 
     base, mast = ("map", "base_link"), ("base_link", "mast")
     bench.wait(lambda: move(base, mast) or shapes(robot) == {BOX, CYLINDER})
@@ -499,7 +469,7 @@ def test_the_status_is_the_same_after_it_was_disabled(bench: SceneBench) -> None
     view = bench.load("RobotModelDisplay {}")
     (robot,) = view.scene.displays
     publish(bench, URDF.replace('<sphere radius="1"/>', '<mesh filename="file:///gone.stl"/>'))
-    send_transforms(bench, "base_link", "mast")
+    bench.place("base_link", "mast")
     bench.wait(lambda: "Mesh gone.stl" in robot.statusText and "Link" not in robot.statusText)
     before = robot.statusText
     assert "URDF parsed OK" in before
@@ -545,7 +515,7 @@ def test_links_share_the_mesh_that_they_name(
     monkeypatch.setattr(robot_model, "load_mesh_cached", count)
     view = bench.load("RobotModelDisplay {}")
     (robot,) = view.scene.displays
-    send_transforms(bench, "base", *(f"arm{at}" for at in range(30)))
+    bench.place("base", *(f"arm{at}" for at in range(30)))
     publish(bench, arms([triangles(tmp_path, "arm.stl", 2)] * 30))
     bench.wait(lambda: len(list(robot.root.drawables())) == 30)
     assert len(shapes(robot)) == 1
@@ -572,7 +542,7 @@ def test_screenshots_wait_for_meshes_that_are_being_read(
     (robot,) = view.scene.displays
     assert not is_loading(bench.window)
     meshes = [triangles(tmp_path, f"{name}.stl", 2) for name in ("first", "second", "third")]
-    send_transforms(bench, "base", "arm0", "arm1", "arm2", "arm3")
+    bench.place("base", "arm0", "arm1", "arm2", "arm3")
     publish(bench, arms([*meshes, meshes[0]]))
     text = "URDF: loading 2 of 3 meshes"
     bench.wait(lambda: text in robot.statusText, lambda: robot.statusText)
@@ -604,7 +574,7 @@ def test_all_meshes_of_a_robot_are_bounded(
     bench.wait(lambda: "Mesh large.stl: " in robot.statusText, lambda: robot.statusText)
     text = "large.stl: with its 4 triangles, all meshes have more than 5; reduce them"
     assert text in robot.statusText
-    send_transforms(bench, "base", "arm0", "arm1", "arm2")
+    bench.place("base", "arm0", "arm1", "arm2")
     bench.wait(lambda: len(list(robot.root.drawables())) == 2)
 
 

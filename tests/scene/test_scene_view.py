@@ -314,20 +314,14 @@ def test_a_view_that_is_destroyed_does_not_wait_for_a_file_that_is_read(
 
 
 def test_a_display_in_a_frame_follows_it(bench: SceneBench) -> None:
-    from rosglass import Time
-    from rosglass.tf import Transform, TransformBroadcaster
-
     view = bench.load('AxesDisplay { frame: "tool"; length: 0.3; radius: 0.1 }')
     (axes,) = view.scene.displays
     bench.wait(lambda: "no transform from [tool]" in axes.statusText)
     assert axes.statusLevel == "error"
     assert not shaded(bench.picture(), 2).any()
-    broadcaster = TransformBroadcaster(bench.robot)
 
     def send() -> bool:
-        broadcaster.send_transform(
-            Transform((0, 0, 2), (0, 0, 0, 1), Time.from_parts(7, 0), "map", "tool")
-        )
+        bench.move("tool", (0, 0, 2), 7)
         return axes.statusLevel == "ok"
 
     bench.wait(send)
@@ -339,17 +333,13 @@ def test_a_display_in_a_frame_follows_it(bench: SceneBench) -> None:
 def test_display_of_a_frame_fades_once_the_frame_is_not_published(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass import Time
     from rosglass.scene.displays import display as displays
-    from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 3600.0)
     view = bench.load('AxesDisplay { frame: "tool" }')
     (axes,) = view.scene.displays
-    broadcaster = TransformBroadcaster(bench.robot)
-    pose = Transform((0, 0, 2), (0, 0, 0, 1), Time.from_parts(7, 0), "map", "tool")
-    bench.wait(lambda: broadcaster.send_transform(pose) or axes.statusLevel == "ok")
-    broadcaster.close()
+    bench.wait(lambda: bench.move("tool", (0, 0, 2), 7) or axes.statusLevel == "ok")
+    bench.moving.close()
     bench.wait(lambda: "[tool] may be somewhere else" in axes.statusText)
     assert axes.root.alpha < 1.0
 
@@ -357,17 +347,13 @@ def test_display_of_a_frame_fades_once_the_frame_is_not_published(
 def test_a_broken_display_keeps_no_other_from_fading(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass import Time
     from rosglass.scene.displays import display as displays
-    from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 0.1)
     view = bench.load('AxesDisplay {} AxesDisplay { frame: "tool" }')
     broken, axes = view.scene.displays
     monkeypatch.setattr(broken, "followed_frames", lambda: 1 / 0)
-    broadcaster = TransformBroadcaster(bench.robot)
-    pose = Transform((0, 0, 2), (0, 0, 0, 1), Time.from_parts(7, 0), "map", "tool")
-    bench.wait(lambda: broadcaster.send_transform(pose) or axes.statusLevel == "ok")
+    bench.wait(lambda: bench.move("tool", (0, 0, 2), 7) or axes.statusLevel == "ok")
     bench.wait(lambda: "[tool] may be somewhere else" in axes.statusText)
     assert "ZeroDivisionError" in broken.statusText
 
@@ -539,14 +525,9 @@ def test_picking_finds_the_nearest_drawable(bench: SceneBench) -> None:
 
 
 def test_data_ahead_of_its_transform_is_not_an_error_for_a_second(bench: SceneBench) -> None:
-    from rosglass import Time
-    from rosglass.tf import Transform, TransformBroadcaster
-
     view = bench.load('PathDisplay { topic: "/plan" }')
     (path,) = view.scene.displays
-    publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
-    broadcaster = TransformBroadcaster(bench.robot)
-    bench.wait(publisher.subscription_count)
+    publisher = bench.publisher("/plan", "nav_msgs/Path")
 
     def send(sec: int) -> None:
         before = path.received
@@ -555,9 +536,7 @@ def test_data_ahead_of_its_transform_is_not_an_error_for_a_second(bench: SceneBe
         bench.wait(lambda: path.received > before)
 
     def move(sec: int) -> None:
-        broadcaster.send_transform(
-            Transform((0, 0, 0), (0, 0, 0, 1), Time.from_parts(sec, 0), "map", "odom")
-        )
+        bench.move("odom", (0, 0, 0), sec)
 
     send(5)
     assert "no transform from [odom]" in path.statusText
@@ -617,21 +596,13 @@ def test_a_view_that_leaves_its_window_has_nothing_on_its_device(bench: SceneBen
 
 
 def test_frames_fade_one_by_one_and_all_when_transforms_stop(bench: SceneBench) -> None:
-    from rosglass import Time
     from rosglass.scene.render.drawing import Mesh
-    from rosglass.tf import StaticTransformBroadcaster, Transform, TransformBroadcaster
 
     view = bench.load("TFDisplay { frameTimeout: 3600; showArrows: false }")
     (frames,) = view.scene.displays
-    StaticTransformBroadcaster(bench.robot).send_transform(
-        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
-    )
-    StaticTransformBroadcaster(bench.robot).send_transform(
-        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "arm", "hand")
-    )
-    TransformBroadcaster(bench.robot).send_transform(
-        Transform((2, 0, 0), (0, 0, 0, 1), Time(1), "map", "arm")
-    )
+    bench.place("mast", at=(1, 0, 0))
+    bench.place("hand", at=(1, 0, 0), parent="arm")
+    bench.move("arm", (2, 0, 0), 1)
 
     def opacities() -> dict[str, float]:
         meshes = [one for one, _, _ in frames.root.drawables() if isinstance(one, Mesh)]
@@ -655,15 +626,11 @@ def test_frames_fade_one_by_one_and_all_when_transforms_stop(bench: SceneBench) 
 
 
 def test_frames_that_do_not_move_follow_another_fixed_frame(bench: SceneBench) -> None:
-    from rosglass import Time
     from rosglass.scene.render.drawing import Mesh
-    from rosglass.tf import StaticTransformBroadcaster, Transform
 
     view = bench.load("TFDisplay { showArrows: false }")
     (frames,) = view.scene.displays
-    StaticTransformBroadcaster(bench.robot).send_transform(
-        Transform((3, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
-    )
+    bench.place("mast", at=(3, 0, 0))
 
     def places() -> dict[str, float]:
         (axes,) = (one for one, _, _ in frames.root.drawables() if isinstance(one, Mesh))
@@ -678,18 +645,14 @@ def test_frames_that_do_not_move_follow_another_fixed_frame(bench: SceneBench) -
 
 
 def test_frames_are_updated_at_the_interval_and_at_once_after_it_is_0(bench: SceneBench) -> None:
-    from rosglass import Time
     from rosglass.scene.render.drawing import Mesh
-    from rosglass.tf import Transform, TransformBroadcaster
 
     view = bench.load("TFDisplay { updateInterval: 1000; showArrows: false }")
     (frames,) = view.scene.displays
-    moving = TransformBroadcaster(bench.robot)
     sent = itertools.count(1)
 
     def move(x: float) -> list[str]:
-        stamp = Time.from_parts(next(sent), 0)
-        moving.send_transform(Transform((x, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+        bench.move("arm", (x, 0, 0), next(sent))
         return frames.frames
 
     def places() -> list[float]:
@@ -710,15 +673,11 @@ def test_frames_are_updated_at_the_interval_and_at_once_after_it_is_0(bench: Sce
 
 
 def test_a_static_frame_is_shown_after_the_interval_in_which_it_came(bench: SceneBench) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     view = bench.load("TFDisplay { updateInterval: 1 }")
     (frames,) = view.scene.displays
-    static = StaticTransformBroadcaster(bench.robot)
 
     def add(frame: str) -> None:
-        static.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", frame))
+        bench.place(frame, at=(1, 0, 0))
 
     add("arm")
     bench.wait(lambda: frames.frames == ["arm", "map"])
@@ -727,17 +686,12 @@ def test_a_static_frame_is_shown_after_the_interval_in_which_it_came(bench: Scen
 
 
 def test_displays_of_frames_fade_without_a_node(bench: SceneBench) -> None:
-    from rosglass import Time
-    from rosglass.tf import Transform, TransformBroadcaster
-
     view = bench.load('TFDisplay { frameTimeout: 2 } AxesDisplay { frame: "arm" } GridDisplay {}')
     frames, axes, grid = view.scene.displays
-    moving = TransformBroadcaster(bench.robot)
     sent = itertools.count(1)
 
     def move() -> bool:
-        stamp = Time.from_parts(next(sent), 0)
-        moving.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+        bench.move("arm", (1, 0, 0), next(sent))
         return frames.frames == ["arm", "map"] and axes.statusLevel == "ok"
 
     bench.wait(move)
@@ -758,14 +712,12 @@ def test_no_frame_fades_while_a_simulation_is_paused(bench: SceneBench, monkeypa
     from rosglass import Time
     from rosglass.scene.displays import display as displays
     from rosglass.scene.displays import scene_frames as scenes
-    from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 1.0)
     monkeypatch.setattr(scenes, "_PAUSED_S", 0.3)
     view = bench.load('TFDisplay { frameTimeout: 1 } AxesDisplay { frame: "arm" }')
     frames, axes = view.scene.displays
     clock = bench.robot.create_publisher("/clock", "rosgraph_msgs/msg/Clock")
-    moving = TransformBroadcaster(bench.robot)
     view.scene.node.parameters.set({"use_sim_time": True})
     bench.wait(clock.subscription_count)
     passed = itertools.count(1)
@@ -774,8 +726,7 @@ def test_no_frame_fades_while_a_simulation_is_paused(bench: SceneBench, monkeypa
         clock.publish({"clock": {"sec": 10, "nanosec": next(passed)}})
 
     def move() -> bool:
-        stamp = Time.from_parts(10, next(passed))
-        moving.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+        bench.move("arm", (1, 0, 0), Time.from_parts(10, next(passed)))
         return frames.frames == ["arm", "map"] and axes.statusLevel == "ok"
 
     run()
@@ -794,13 +745,8 @@ def test_no_frame_fades_while_a_simulation_is_paused(bench: SceneBench, monkeypa
 
 
 def test_the_camera_follows_a_frame_that_stands_still(bench: SceneBench) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     view = bench.load("TFDisplay {}")
-    StaticTransformBroadcaster(bench.robot).send_transform(
-        Transform((3, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
-    )
+    bench.place("mast", at=(3, 0, 0))
     bench.wait(lambda: view.scene.displays[0].frames == ["map", "mast"])
     bench.wait.settled(bench.session)
     # With the slash of RViz 1.
@@ -844,8 +790,7 @@ def test_data_of_a_publisher_that_is_gone_stays_so_beside_another(bench: SceneBe
     (path,) = view.scene.displays
 
     def publish(qos: Any = 1) -> Any:
-        publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path", qos)
-        bench.wait(publisher.subscription_count)
+        publisher = bench.publisher("/plan", "nav_msgs/Path", qos)
         before = path.received
         publisher.publish({"header": {"frame_id": "map"}})
         bench.wait(lambda: path.received > before and path.statusLevel == "ok")
@@ -854,8 +799,7 @@ def test_data_of_a_publisher_that_is_gone_stays_so_beside_another(bench: SceneBe
     first = publish()
     first.close()
     bench.wait(lambda: "its publisher is gone" in path.statusText)
-    second = bench.robot.create_publisher("/plan", "nav_msgs/Path")
-    bench.wait(second.subscription_count)
+    second = bench.publisher("/plan", "nav_msgs/Path")
     bench.wait.nothing_happens(0.3)
     assert "its publisher is gone" in path.statusText
     second.close()
@@ -877,8 +821,7 @@ def test_displays_of_a_hidden_group_show_nothing_old_later(bench: SceneBench) ->
     path = view.scene.TYPES["Path"](view.scene, runtime_of(view.scene))
     path.group, path.topic = group, "/plan"
     view.scene.adopt(path)
-    publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
-    bench.wait(publisher.subscription_count)
+    publisher = bench.publisher("/plan", "nav_msgs/Path")
     publisher.publish({"header": {"frame_id": "map"}})
     bench.wait(lambda: path.statusLevel == "ok" and list(path.root))
     group.enabled = False
@@ -912,13 +855,8 @@ def test_nothing_that_is_on_its_way_is_shown_after_a_change(bench: SceneBench, c
 
 
 def test_a_fixed_frame_that_does_not_exist_is_a_problem(bench: SceneBench) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     view = bench.load()
-    StaticTransformBroadcaster(bench.robot).send_transform(
-        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
-    )
+    bench.place("mast", at=(1, 0, 0))
     bench.wait(view.scene.frames)
     view.fixedFrame = "mapp"
     bench.wait(lambda: view.problem)
@@ -928,13 +866,8 @@ def test_a_fixed_frame_that_does_not_exist_is_a_problem(bench: SceneBench) -> No
 
 
 def test_a_problem_of_a_fixed_frame_ends_with_the_node(bench: SceneBench) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     view = bench.load()
-    StaticTransformBroadcaster(bench.robot).send_transform(
-        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
-    )
+    bench.place("mast", at=(1, 0, 0))
     bench.wait(view.scene.frames)
     view.fixedFrame = "mapp"
     bench.wait(lambda: "does not exist" in view.problem)
@@ -1022,16 +955,11 @@ def test_a_jump_of_time_and_reset_begin_anew(bench: SceneBench) -> None:
 
 
 def test_reset_forgets_transforms_that_are_not_static(bench: SceneBench) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform, TransformBroadcaster
-
     view = bench.load()
-    static = StaticTransformBroadcaster(bench.robot)
-    static.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "base_link", "laser"))
-    moving = TransformBroadcaster(bench.robot)
+    bench.place("laser", at=(1, 0, 0), parent="base_link")
 
     def is_known() -> bool:
-        moving.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "base_link"))
+        bench.move("base_link", (1, 0, 0), 1)
         return {"map", "base_link", "laser"} <= set(view.scene.frames())
 
     bench.wait(is_known)

@@ -21,11 +21,6 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.filterwarnings("error")
 
 
-@pytest.fixture
-def hand(bench: SceneBench) -> Hand:
-    return Hand(bench)
-
-
 def listen(bench: SceneBench, topic: str, message_type: str) -> list[Any]:
     received: list[Any] = []
     bench.robot.create_subscription(topic, message_type, received.append)

@@ -64,13 +64,8 @@ def test_a_volatile_display_says_that_earlier_messages_are_kept(bench: SceneBenc
 
 
 def test_a_reference_frame_of_rviz_1_may_have_a_slash(bench: SceneBench) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     view = bench.load('AxesDisplay { frame: "/map" } AxesDisplay { frame: "/mast" }')
-    StaticTransformBroadcaster(bench.robot).send_transform(
-        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
-    )
+    bench.place("mast", at=(1, 0, 0))
     bench.wait(view.scene.frames)
     bench.wait(lambda: all(one.statusLevel == "ok" for one in view.scene.displays))
 
@@ -159,13 +154,8 @@ def test_a_policy_that_no_publisher_offers_is_named(bench: SceneBench) -> None:
 def test_each_message_of_a_history_is_shown_once_in_any_fixed_frame(
     bench: SceneBench, kind: str, message: str, settings: dict[str, Any], shape: Any
 ) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     view = bench.load()
-    StaticTransformBroadcaster(bench.robot).send_transform(
-        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "odom")
-    )
+    bench.place("odom", at=(1, 0, 0))
     bench.wait(view.scene.frames)
     display = view.scene.add(kind, topic="/shown", **settings)
     publisher = bench.robot.create_publisher("/shown", message)
@@ -200,9 +190,7 @@ def test_each_message_of_a_history_is_shown_once_in_any_fixed_frame(
 def test_a_kept_message_is_shown_once_a_new_fixed_frame_exists(
     bench: SceneBench, length: int
 ) -> None:
-    from rosglass import Time
     from rosglass.comm.qos import QoS
-    from rosglass.tf import StaticTransformBroadcaster, Transform
 
     view = bench.load()
     display = view.scene.add("PointStamped", topic="/point", historyLength=length)
@@ -212,9 +200,7 @@ def test_a_kept_message_is_shown_once_a_new_fixed_frame_exists(
     view.fixedFrame = "odom"
     assert parts(display, SPHERE) == []
     assert display.statusLevel == "error"
-    StaticTransformBroadcaster(bench.robot).send_transform(
-        Transform((3, 0, 0), (0, 0, 0, 1), Time(1), "odom", "map")
-    )
+    bench.place("map", at=(3, 0, 0), parent="odom")
     bench.wait(lambda: len(parts(display, SPHERE)) == 1)
     ((_, pose),) = parts(display, SPHERE)
     assert pose[0, 3] == 3.0
@@ -224,9 +210,7 @@ def test_a_kept_message_is_shown_once_a_new_fixed_frame_exists(
 def test_messages_that_wait_for_their_transform_are_all_shown_later(
     bench: SceneBench, monkeypatch: Any
 ) -> None:
-    from rosglass import Time
     from rosglass.scene.displays import topic_display as displays
-    from rosglass.tf import StaticTransformBroadcaster, Transform
 
     view = bench.load()
     odometry = view.scene.add("Odometry", topic="/odom", covariance=False)
@@ -249,9 +233,7 @@ def test_messages_that_wait_for_their_transform_are_all_shown_later(
     bench.wait.settled(bench.session)
     for display in (odometry, points):
         assert "Dropped" not in display.statusText
-    StaticTransformBroadcaster(bench.robot).send_transform(
-        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "odom")
-    )
+    bench.place("odom", at=(1, 0, 0))
     bench.wait(lambda: sum(one.count for one, _ in parts(odometry, CYLINDER)) == 12)
     assert len(parts(points, SPHERE)) == 3
     # Of clouds, which are large, only the setting Depth are kept.
@@ -259,8 +241,7 @@ def test_messages_that_wait_for_their_transform_are_all_shown_later(
     # What is more than that is said.
     monkeypatch.setattr(displays, "MOST_WAITING", 10)
     odometry.topic = "/odom2"
-    other = bench.robot.create_publisher("/odom2", "nav_msgs/Odometry")
-    bench.wait(other.subscription_count)
+    other = bench.publisher("/odom2", "nav_msgs/Odometry")
     for number in range(12):
         other.publish({"header": {"frame_id": "nowhere"}})
         bench.wait(lambda: odometry.received == number + 1)  # noqa: B023
@@ -278,8 +259,7 @@ def test_bytes_of_what_waits_are_bounded(bench: SceneBench, monkeypatch: Any) ->
 
     view = bench.load()
     display = view.scene.add("PointCloud2", topic="/cloud", decayTime=60.0, depth=100)
-    publisher = bench.robot.create_publisher("/cloud", "sensor_msgs/PointCloud2")
-    bench.wait(publisher.subscription_count)
+    publisher = bench.publisher("/cloud", "sensor_msgs/PointCloud2")
     cloud = {**CLOUD, "header": {"frame_id": "odom"}}
     publisher.publish(cloud)
     bench.wait(lambda: waiting_of(display))
@@ -307,17 +287,13 @@ def test_bytes_of_what_waits_are_bounded(bench: SceneBench, monkeypatch: Any) ->
 
 
 def test_shown_data_fades_while_newer_data_waits_for_its_transform(bench: SceneBench) -> None:
-    from rosglass import Time
-    from rosglass.tf import Transform, TransformBroadcaster
 
     view = bench.load('PointStampedDisplay { topic: "/point" } GridDisplay {}')
     display = view.scene.displays[0]
     points = bench.robot.create_publisher("/point", "geometry_msgs/PointStamped")
-    moving = TransformBroadcaster(bench.robot)
 
     def move(second: int) -> None:
-        stamp = Time.from_parts(second, 0)
-        moving.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+        bench.move("arm", (0, 0, 0), second)
 
     def send(second: int) -> None:
         stamp = {"sec": second, "nanosec": 0}
@@ -342,16 +318,13 @@ def test_shown_data_fades_while_newer_data_waits_for_its_transform(bench: SceneB
 
 
 def test_shown_data_fades_while_newer_data_is_stamped_ahead(bench: SceneBench) -> None:
-    from rosglass.tf import Transform, TransformBroadcaster
-
     view = bench.load('PointStampedDisplay { topic: "/point" }')
     (display,) = view.scene.displays
     points = bench.robot.create_publisher("/point", "geometry_msgs/PointStamped")
-    moving = TransformBroadcaster(bench.robot)
 
     def send(ahead_ns: int) -> None:
         now = bench.robot.now()
-        moving.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), now, "map", "arm"))
+        bench.move("arm", (0, 0, 0), now)
         stamp = type(now)(now.nanoseconds + ahead_ns)
         points.publish({"header": {"frame_id": "arm", "stamp": stamp}})
 
@@ -383,7 +356,6 @@ RANGE = {
 def test_obstacles_fade_when_a_sensor_sends_nothing_any_more(
     bench: SceneBench, monkeypatch: Any
 ) -> None:
-    from rosglass.comm.qos import QoS
     from rosglass.scene.displays import topic_display as displays
 
     monkeypatch.setattr(displays, "_CONTINUOUS_S", 0.5)
@@ -399,7 +371,7 @@ def test_obstacles_fade_when_a_sensor_sends_nothing_any_more(
         (bench.robot.create_publisher("/points", cloud), CLOUD),
     ]
     # A map that is published once is valid until there is another one.
-    bench.robot.create_publisher("/cloud_map", cloud, QoS.latched()).publish(CLOUD)
+    bench.latch("/cloud_map", cloud, CLOUD)
 
     def send() -> bool:
         for publisher, message in publishers:
@@ -542,7 +514,6 @@ def test_lifetimes_and_the_decay_time_are_of_the_robots_time(bench: SceneBench) 
 
 def test_nothing_is_late_while_the_robots_time_stands_still(bench: SceneBench) -> None:
     from rosglass import Time
-    from rosglass.tf import Transform, TransformBroadcaster
 
     view = bench.load('PointStampedDisplay { topic: "/point" }')
     (display,) = view.scene.displays
@@ -561,8 +532,7 @@ def test_nothing_is_late_while_the_robots_time_stands_still(bench: SceneBench) -
         bench.wait(lambda: view.scene.now() == stamp.nanoseconds)
 
     set_time(10.0)
-    transform = Transform((0, 0, 0), (0, 0, 0, 1), Time.from_parts(10, 0), "map", "arm")
-    TransformBroadcaster(bench.robot).send_transform(transform)
+    bench.move("arm", (0, 0, 0), 10)
     bench.wait(lambda: "arm" in view.scene.frames())
     # The change of time has made it subscribe anew.
     bench.wait(lambda: send(10) or len(parts(display, SPHERE)) == 1)

@@ -321,14 +321,11 @@ def test_status_says_where_robots_reach_the_camera(bench: SceneBench) -> None:
 
 
 def test_a_frame_is_followed_once_it_exists(bench: SceneBench) -> None:
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     display = show(bench, 'trackedFrame: "rover"; trackingGain: 1000; animationDuration: 0')
     view = control(bench).view
     bench.wait(lambda: "Tracked Frame: there is no frame 'rover'" in display.statusText)
     assert view.tracked_frame == ""
-    transform = Transform((2.0, 1.0, 0.0), frame_id="map", child_frame_id="rover")
-    StaticTransformBroadcaster(bench.robot).send_transform(transform)
+    bench.place("rover", at=(2.0, 1.0, 0.0))
     bench.wait(lambda: near(bench.view.camera().eye, (6, 1, 3)))
     assert view.tracked_frame == "rover"
     bench.wait(lambda: "Tracked Frame: rover" in display.statusText)

@@ -258,8 +258,7 @@ def test_a_display_is_duplicated_with_its_settings(bench: SceneBench, grouped: A
 
 def test_a_display_in_a_group_is_shown_and_hidden_with_it(bench: SceneBench, grouped: Any) -> None:
     scene = bench.view.scene
-    publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
-    bench.wait(publisher.subscription_count)
+    publisher = bench.publisher("/plan", "nav_msgs/Path")
     _, group, _, plan = scene.displays
     group.enabled = False
     grouped.drop(row_of(grouped, "Plan"), row_of(grouped, "Robot"), 0.5)
@@ -317,8 +316,7 @@ def test_namespaces_and_links_are_rows_with_check_boxes(
 
     monkeypatch.setattr(panel_models, "_MAX_PARTS", 3)
     markers = bench.view.scene.add("MarkerArray", topic="/markers")
-    publisher = bench.robot.create_publisher("/markers", "visualization_msgs/MarkerArray")
-    bench.wait(publisher.subscription_count)
+    publisher = bench.publisher("/markers", "visualization_msgs/MarkerArray")
     names = ["a/b", "c" * 10_000, "", "d", "e"]
     made = {"header": {"frame_id": "map"}, "type": 1, "scale": {"x": 1.0, "y": 1.0, "z": 1.0}}
     publisher.publish({"markers": [{**made, "ns": name} for name in names]})
@@ -338,12 +336,8 @@ def test_namespaces_and_links_are_rows_with_check_boxes(
 
 
 def test_all_frames_are_shown_or_hidden(bench: SceneBench, model: Any) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
-    broadcaster = StaticTransformBroadcaster(bench.robot)
     for name in ("base", "tool"):
-        broadcaster.send_transform(Transform((1, 0, 0.5), (0, 0, 0, 1), Time(1), "map", name))
+        bench.place(name, at=(1, 0, 0.5))
     tf = bench.view.scene.add("TF")
     bench.wait(lambda: tf.frames == ["base", "map", "tool"])
     model.refresh()
@@ -378,7 +372,7 @@ def test_all_frames_are_shown_or_hidden(bench: SceneBench, model: Any) -> None:
         "tool": {"Value": False},
     }
     # Frames that a file does not name are shown, whatever it says of all.
-    broadcaster.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "arm"))
+    bench.place("arm", at=(1, 0, 0))
     other = bench.view.scene.add("TF")
     assert other.load_settings(saved) == []
     bench.wait(lambda: other.frames == ["arm", "base"])
@@ -557,17 +551,14 @@ def test_typed_paths_are_taken_as_they_are(app: Any, chosen: str, meant: str) ->
 
 
 def test_unsaved_changes_prevent_closing(bench: SceneBench, tmp_path: Path) -> None:
-    from rosglass import Time
     from rosglass.scene.app.program import ViewProgram
-    from rosglass.tf import StaticTransformBroadcaster, Transform
 
     view = bench.load()
     program = ViewProgram()
     program.begin(view)
     assert program.mayClose()
     # The robot's own data, such as its frames, is not a change.
-    broadcaster = StaticTransformBroadcaster(bench.robot)
-    broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", "tool"))
+    bench.place("tool")
     bench.wait(lambda: view.scene.find("TF").frames == ["map", "tool"])
     assert program.mayClose()
     view.scene.displays[0].cellSize = 2.0
@@ -769,11 +760,7 @@ def test_the_view_shows_the_color_that_a_dialog_has(bench: SceneBench, window: A
 
 
 def test_a_frame_is_hidden_by_its_check_box(bench: SceneBench, window: Any) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
-    broadcaster = StaticTransformBroadcaster(bench.robot)
-    broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", "tool"))
+    bench.place("tool")
     rows = Rows(window)
     tf = rows.scene.find("TF")
     bench.wait(lambda: tf.frames == ["map", "tool"])
@@ -816,11 +803,7 @@ def test_a_typed_frame_counts_when_the_user_goes_on(bench: SceneBench, window: A
     from PySide6.QtCore import QObject, QPoint
     from PySide6.QtTest import QTest
 
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
-    broadcaster = StaticTransformBroadcaster(bench.robot)
-    broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", "tool"))
+    bench.place("tool")
     rows = Rows(window)
     view = window.findChild(QObject, "scene")
     bench.wait(lambda: "tool" in rows.scene.frames())
