@@ -223,43 +223,6 @@ def test_limit_of_zero_is_a_warning(bench: SceneBench, robot: Robot) -> None:
     assert arcs(display) == []
 
 
-@pytest.mark.parametrize(
-    ("fields", "text"),
-    [
-        (
-            {"name": ["shoulder"], "effort": []},
-            "name has 1 entries, effort 0; the publisher measures none",
-        ),
-        (
-            {"name": ["shoulder"], "effort": [1.0, 2.0]},
-            "name has 1 entries, effort 2",
-        ),
-        (
-            {"name": ["j"] * 10_001, "effort": np.zeros(10_001)},
-            "name: 10001 joints are more than the 10000 that are read",
-        ),
-    ],
-)
-def test_arrays_that_do_not_fit_are_errors(
-    bench: SceneBench,
-    robot: Robot,
-    monkeypatch: pytest.MonkeyPatch,
-    fields: dict[str, Any],
-    text: str,
-) -> None:
-    from rosglass.scene.displays import effort
-
-    monkeypatch.setattr(effort, "_COMBINED_S", 0.0)
-    display = add(bench, robot)
-    robot.place("upper")
-    robot.send({"shoulder": 5.0})
-    bench.wait(lambda: len(arcs(display)) == 1)
-    robot.states.publish(fields)
-    bench.wait(lambda: display.statusLevel == "error")
-    assert display.status_lines["Message"] == ("error", text)
-    assert len(arcs(display)) == 1, "the last good message stays"
-
-
 def test_a_broken_description_is_an_error_until_a_good_one_comes(
     bench: SceneBench, robot: Robot
 ) -> None:

@@ -269,23 +269,17 @@ class Robot:
     """A robot whose messages are wrong, beside a display whose messages are right."""
 
     def __init__(self, bench: SceneBench, watch: Watch, body: str = "") -> None:
-        from rosglass import Time
-        from rosglass.tf import StaticTransformBroadcaster, Transform
-
         self.bench, self._watch, self.node = bench, watch, bench.robot
         #: The number of the last update of interactive markers.
         self._number = 0
         self.view = bench.load(body)
-        tf = StaticTransformBroadcaster(self.node)
-        tf.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "odom"))
+        bench.place("odom", at=(1, 0, 0))
         self.good = self.view.scene.add("Pose", topic="/good")
         self._good = self.node.create_publisher("/good", "geometry_msgs/PoseStamped")
         bench.wait(lambda: self._good.subscription_count() and self.view.scene.frames())
 
     def show(self, case: Case) -> None:
         """Show a case, prepared as far as it needs other messages."""
-        from rosglass.comm.qos import Durability, QoS
-
         node, kind = self.node, case.display
         self.topic = "/hostile/update" if kind == "InteractiveMarkers" else "/hostile/topic"
         if kind == "InteractiveMarkers":
@@ -298,17 +292,9 @@ class Robot:
                 },
             )
         elif kind == "Effort":
-            latched = QoS(1, durability=Durability.TRANSIENT_LOCAL)
-            description = node.create_publisher(
-                "/robot_description", "std_msgs/String", qos=latched
-            )
-            description.publish({"data": ROBOT})
+            self.bench.latch("/robot_description", "std_msgs/String", {"data": ROBOT})
         elif kind == "DepthCloud":
-            latched = QoS(1, durability=Durability.TRANSIENT_LOCAL)
-            info = node.create_publisher(
-                "/hostile/camera_info", "sensor_msgs/CameraInfo", qos=latched
-            )
-            info.publish(CAMERA)
+            self.bench.latch("/hostile/camera_info", "sensor_msgs/CameraInfo", CAMERA)
         self.display = self.view.scene.add(kind, topic=self.topic, **case.settings)
         self.publisher = node.create_publisher(self.topic, case.type)
         self.message = {**case.message, "header": HEADER}
@@ -426,6 +412,92 @@ def test_all_fields_may_be_random(robot: Robot, watch: Watch, case: Case) -> Non
     display.reset()
     robot.send(robot.message)
     robot.bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText, timeout=10.0)
+    robot.check()
+
+
+def with_info(**fields: Any) -> dict[str, Any]:
+    return {"info": {**GRID["info"], **fields}}
+
+
+def with_field(**fields: Any) -> dict[str, Any]:
+    return {"fields": [{"name": "x", "offset": 0, "datatype": 7, "count": 1, **fields}]}
+
+
+def second_handle(**fields: Any) -> dict[str, Any]:
+    return {"markers": [{**INTERACTIVE, "name": "bad", **fields}], "poses": []}
+
+
+#: A second marker or handle, for displays that show several.
+SECOND = {"Marker": {"id": 2}, "InteractiveMarkers": second_handle()}
+NAN, INF = math.nan, math.inf
+#: Displays, the fields of a wrong message, and what the status says.
+WRONG: list[tuple[str, dict[str, Any], str]] = [
+    ("Pose", {"pose": {"orientation": {"w": 3.0}}}, "quaternion (0.0, 0.0, 0.0, 3.0) is not norm"),
+    ("Pose", {"pose": {"orientation": {"w": NAN}}}, "is not finite"),
+    ("Map", with_info(width=30), "data: 6 cells; expected 30 x 2 = 60"),
+    ("Map", with_info(width=0), "width 0, height 2: expected 1 to 16384 cells"),
+    ("Map", with_info(width=4_000_000_000), "width 4000000000"),
+    ("Map", with_info(resolution=NAN), "info.resolution: expected metres above 0"),
+    ("Map", with_info(origin={"position": {"x": INF}}), "is not finite"),
+    ("GridCells", {"cell_width": 0.0}, "cell_width 0.0, cell_height 0.1"),
+    ("PointCloud2", {"width": 30}, "row_step"),
+    ("PointCloud2", {"width": 4_000_000_000, "row_step": 4_000_000_000}, "row_step"),
+    ("PointCloud2", {"data": b""}, "data"),
+    ("PointCloud2", {"point_step": 0, "row_step": 0}, "point_step is 0"),
+    ("PointCloud2", {"fields": []}, "no field 'x'"),
+    ("PointCloud2", with_field(offset=13), "ends at byte 17"),
+    ("PointCloud2", with_field(datatype=99), "'x' has datatype"),
+    ("DepthCloud", {"encoding": "rgb8"}, "32FC1, compressedDepth, got 'rgb8'"),
+    ("DepthCloud", {"data": b"12"}, "needs 64 bytes, data has 2"),
+    ("DepthCloud", {"width": 3_000_000}, "3000000x4 pixels, the camera info 4x4"),
+    ("Effort", {"name": ["arm"], "effort": []}, "1 entries, effort 0; the publisher measures none"),
+    ("Effort", {"name": ["arm"], "effort": [1.0, 2.0]}, "name has 1 entries, effort 2"),
+    ("Effort", {"name": ["j"] * 10_001, "effort": np.zeros(10_001)},
+     "name: 10001 joints are more than the 10000 that are read"),
+    ("Marker", {"type": 99}, "type 99: expected 0 to 12"),
+    ("Marker", {"action": 7}, "action 7: expected"),
+    ("Marker", {"pose": {"position": {"x": NAN}}}, "is not finite"),
+    ("Marker", {"type": 5, "points": [POINT]}, "points: 1 are not pairs"),
+    ("Marker", {"type": 11, "points": [POINT]}, "are not triples"),
+    ("Marker", {"type": 0, "points": [POINT]}, "has none, or start and end"),
+    ("InteractiveMarkers", second_handle(scale=NAN), "Marker bad: scale nan"),
+    ("InteractiveMarkers", second_handle(pose={"orientation": {"w": INF}}), "is not finite"),
+    ("InteractiveMarkers", second_handle(controls=[control(77, name="up")]),
+     "control 'up': interaction_mode 77 is invalid"),
+    ("InteractiveMarkers", second_handle(controls=[control(3, orientation_mode=9)]),
+     "orientation_mode 9 is invalid"),
+    ("InteractiveMarkers", second_handle(controls=[]), "it has no controls"),
+    ("InteractiveMarkers", second_handle(menu_entries=[{"id": 7, "parent_id": 7}]),
+     "menu entry 7: its parent 7 is not above it"),
+    ("InteractiveMarkers",
+     second_handle(menu_entries=[{"id": at + 1, "parent_id": at} for at in range(400)]),
+     "menu entry 11 is deeper than 10 menus"),
+    ("InteractiveMarkers", second_handle(controls=[control(2, markers=[marker(55)])]),
+     "type 55: expected 0 to 12"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "fields", "error"), WRONG)
+def test_a_wrong_message_is_an_error_and_what_was_right_stays(
+    robot: Robot, monkeypatch: Any, kind: str, fields: dict[str, Any], error: str
+) -> None:
+    monkeypatch.setattr("rosglass.scene.displays.effort._COMBINED_S", 0.0)
+    robot.show(next(case for case in CASES if case.display == kind))
+    display, bench = robot.display, robot.bench
+    bench.wait.settled(bench.session)
+    before = bench.picture()
+    right = {**robot.message, **SECOND.get(kind, {})}
+    robot.send({**right, **fields})
+    bench.wait(lambda: display.statusLevel == "error", lambda: display.statusText)
+    assert error in display.statusText
+    if kind == "InteractiveMarkers":
+        # What is right of a marker is shown.
+        assert "handle" in display.markers
+    else:
+        assert list(display.root.drawables())
+        assert (bench.picture() == before).all()
+    robot.send(right)
+    bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
     robot.check()
 
 
@@ -699,15 +771,10 @@ def test_names_of_frames_that_are_not_kept_are_reported(robot: Robot) -> None:
 
 
 def test_filters_do_not_take_long_whatever_the_names_are(robot: Robot) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     display, bench = robot.view.scene.add("TF"), robot.bench
     # Python's re would need 2^60 steps for the second one.
     names = ["arm", "a" * 60 + "!", "b" * 201, "tool"]
-    StaticTransformBroadcaster(robot.node).send_transform(
-        [Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "odom", name) for name in names]
-    )
+    bench.place(*names, at=(1, 0, 0), parent="odom")
     bench.wait(lambda: len(display.frames) == 6)
     display.whitelist = "^(a+)+$|^[artm]{3}$"
     bench.wait(lambda: len(display.frames) == 3, lambda: display.frames)
@@ -821,15 +888,10 @@ def test_transforms_that_are_refused_are_named(
 
 
 def test_frames_that_are_too_far_away_are_named(robot: Robot) -> None:
-    from rosglass import Time
-    from rosglass.tf import StaticTransformBroadcaster, Transform
-
     frames = robot.view.scene.add("TF")
     robot.show(CASES[0])
-    StaticTransformBroadcaster(robot.node).send_transform(
-        [Transform((1e30, 0, 0), (0, 0, 0, 1), Time(1), "odom", "far"),
-         Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "odom", "near")]
-    )  # fmt: skip
+    robot.bench.place("far", at=(1e30, 0, 0), parent="odom")
+    robot.bench.place("near", at=(1, 0, 0), parent="odom")
     text = "[far] is more than 1e18 m away from [map]"
     robot.bench.wait(lambda: f"far: no transform: {text}" in frames.statusText)
     assert set(frames.frames) == {"map", "near", "odom"}

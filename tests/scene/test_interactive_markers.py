@@ -741,46 +741,6 @@ def test_missing_server_is_in_the_status(bench: SceneBench) -> None:
     assert display.statusLevel == "warn"
 
 
-@pytest.mark.parametrize(
-    ("bad", "text"),
-    [
-        ({"scale": float("nan")}, "scale nan"),
-        ({"pose": {"orientation": {"w": float("inf")}}}, "is not finite"),
-        ({"controls": [control(77)]}, "control 'mode77': interaction_mode 77 is invalid"),
-        ({"controls": [control(3, orientation_mode=9)]}, "orientation_mode 9 is invalid"),
-        ({"controls": []}, "it has no controls"),
-        (
-            {"controls": [control(2, boxes=True)], "menu_entries": [{"id": 7, "parent_id": 7}]},
-            "menu entry 7: its parent 7 is not above it",
-        ),
-        (
-            {
-                "controls": [control(2, boxes=True)],
-                "menu_entries": [{"id": n + 1, "parent_id": n} for n in range(400)],
-            },
-            "menu entry 11 is deeper than 10 menus",
-        ),
-        ({"controls": [control(2, markers=[{**BOX, "type": 55}])]}, "type 55: expected 0 to 12"),
-    ],
-)
-def test_a_bad_marker_says_what_is_wrong_and_the_others_are_shown(
-    bench: SceneBench,
-    show: Callable[..., Any],
-    server: MarkerServer,
-    bad: dict[str, Any],
-    text: str,
-) -> None:
-    display = show(marker(control(MOVE_AXIS)))
-    server.insert({**marker(control(MOVE_AXIS), name="bad"), **bad})
-    bench.wait(lambda: "Marker bad: " in display.statusText)
-    assert text in display.statusText
-    assert display.statusLevel == "error"
-    assert "arm" in display.markers
-    server.insert(marker(control(MOVE_AXIS), name="bad"))
-    bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
-    assert display.markers == ["arm", "bad"]
-
-
 def test_a_mesh_that_was_missing_is_read_again(
     bench: SceneBench,
     show: Callable[..., Any],

@@ -528,29 +528,6 @@ def test_markers_of_a_publisher_that_is_gone_are_faded(bench: SceneBench) -> Non
     assert "Data: its publisher is gone" in display.statusText
 
 
-@pytest.mark.parametrize(
-    ("bad", "text"),
-    [
-        ({"type": 99}, "type 99: expected 0 to 12"),
-        ({"action": 7}, "action 7: expected"),
-        ({"pose": {"position": {"x": float("nan")}}}, "is not finite"),
-        ({"type": 5, "points": points((0, 0, 0))}, "points: 1 are not pairs"),
-        ({"type": 11, "points": points((0, 0, 0))}, "are not triples"),
-        ({"type": 0, "points": points((0, 0, 0))}, "has none, or start and end"),
-    ],
-)
-def test_a_bad_marker_says_what_is_wrong_and_the_others_are_drawn(
-    show: Callable[..., Any], bad: dict[str, Any], text: str
-) -> None:
-    display = show({**marker(1), **bad}, marker(2, 1))
-    assert display.statusLevel == "error"
-    assert text in display.statusText
-    assert len(drawables(display)) == 1
-    # Mended, its line goes.
-    show(marker(1))
-    assert display.statusLevel == "ok"
-
-
 @pytest.mark.parametrize(("kind", "pixels"), [(1, 100), (3, 100), (0, 20), (6, 100), (7, 100)])
 def test_flat_shapes_are_drawn_with_a_warning(
     bench: SceneBench, show: Callable[..., Any], kind: int, pixels: int

@@ -72,21 +72,6 @@ def test_a_pose_is_an_arrow_or_axes(show: Callable[..., Any]) -> None:
     assert axes.count == 3
 
 
-@pytest.mark.parametrize(
-    ("orientation", "text"),
-    [
-        ({"w": 3.0}, "the quaternion (0.0, 0.0, 0.0, 3.0) is not normalised"),
-        ({"w": float("nan")}, "is not finite"),
-    ],
-)
-def test_a_bad_pose_is_an_error(
-    show: Callable[..., Any], orientation: dict[str, float], text: str
-) -> None:
-    display = show("Pose", "geometry_msgs/PoseStamped", {"pose": pose(**orientation)})
-    assert display.statusLevel == "error"
-    assert text in display.statusText
-
-
 def test_an_array_of_poses_is_drawn_in_three_ways(show: Callable[..., Any]) -> None:
     display = show("PoseArray", "geometry_msgs/PoseArray", {"poses": [pose(1.0), pose(2.0)]})
     (flat,) = parts(display)
