@@ -108,6 +108,11 @@ class SceneBench:
         self.wait(self.window.isExposed)
         return self.view
 
+    def show(self, body: str, imports: str = "") -> Any:
+        """Show a view with one display, and return the display."""
+        (display,) = self.load(body, imports).scene.displays
+        return display
+
     def picture(self) -> NDArray[Any]:
         """Return what the window shows, (height, width, 3)."""
         import numpy as np

@@ -692,8 +692,7 @@ def test_updates_that_come_before_the_markers_count_in_their_order(bench: SceneB
         read_interactive_marker,
     )
 
-    view = bench.load("InteractiveMarkersDisplay { }")
-    (display,) = view.scene.displays
+    display = bench.show("InteractiveMarkersDisplay { }")
     kind = bench.robot.create_publisher("/any", "visualization_msgs/InteractiveMarker").type
 
     def read(name: str) -> InteractiveMarkerRecord:
@@ -735,8 +734,7 @@ def test_a_server_that_is_gone_is_said_and_a_new_one_is_shown(
 
 
 def test_missing_server_is_in_the_status(bench: SceneBench) -> None:
-    view = bench.load('InteractiveMarkersDisplay { topic: "/nowhere/update" }')
-    (display,) = view.scene.displays
+    display = bench.show('InteractiveMarkersDisplay { topic: "/nowhere/update" }')
     bench.wait(lambda: "no server in /nowhere" in display.statusText)
     assert display.statusLevel == "warn"
 
@@ -775,8 +773,7 @@ def test_markers_that_cannot_be_read_are_requested_again(
     monkeypatch.setattr(f"{folder}._RETRY_MS", 100)
     monkeypatch.setattr(f"{folder}_messages._MAX_MARKERS", 1)
     server.markers = {name: marker(control(BUTTON), name=name) for name in ("arm", "leg")}
-    view = bench.load('InteractiveMarkersDisplay { topic: "/server" }')
-    (display,) = view.scene.displays
+    display = bench.show('InteractiveMarkersDisplay { topic: "/server" }')
     bench.wait(lambda: "markers: 2 are more than the 1" in display.statusText)
     bench.wait(lambda: server.requests >= 3)
     del server.markers["leg"]
@@ -805,8 +802,7 @@ def test_invalid_markers_are_named_and_the_others_are_shown(
 
 
 def test_both_rviz_write_the_namespace_differently(bench: SceneBench) -> None:
-    view = bench.load("InteractiveMarkersDisplay { }")
-    (display,) = view.scene.displays
+    display = bench.show("InteractiveMarkersDisplay { }")
     assert display.load_settings({"Update Topic": "/arm/update", "Show Axes": True}) == []
     assert (display.namespace, display.showAxes) == ("/arm", True)
     assert display.save_settings()["Interactive Markers Namespace"] == "/arm"

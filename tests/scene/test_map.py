@@ -29,8 +29,7 @@ def grid(width: int, height: int, value: int, /, **info: Any) -> dict[str, Any]:
 @pytest.fixture
 def show(bench: SceneBench) -> Callable[..., Any]:
     """Publishes maps and updates, and returns the display once it has received them."""
-    view = bench.load('view: "TopDownOrtho"; MapDisplay { topic: "/map"; alpha: 1 }')
-    (display,) = view.scene.displays
+    display = bench.show('view: "TopDownOrtho"; MapDisplay { topic: "/map"; alpha: 1 }')
     publishers = {
         "/map": bench.publisher("/map", "nav_msgs/OccupancyGrid"),
         "/map_updates": bench.publisher("/map_updates", "map_msgs/OccupancyGridUpdate"),
@@ -58,10 +57,9 @@ def test_updates_come_from_any_publisher_whatever_the_policies_of_the_map(
     from rosglass.comm.qos import QoS, Reliability
 
     # As in Nav2's config of RViz.
-    view = bench.load(
+    display = bench.show(
         'MapDisplay { topic: "/map"; durability: "Transient Local"; reliability: "Reliable" }'
     )
-    (display,) = view.scene.displays
     bench.latch("/map", "nav_msgs/OccupancyGrid", grid(20, 10, 0))
     updates = bench.robot.create_publisher(
         "/map_updates",
@@ -81,8 +79,7 @@ def test_an_update_that_is_older_than_the_map_is_not_used(bench: SceneBench) -> 
     updates = bench.robot.create_publisher("/map_updates", "map_msgs/OccupancyGridUpdate", latched)
     updates.publish({**PART, "data": np.full(4, 100, np.int8)})
     bench.robot.create_publisher("/map", "nav_msgs/OccupancyGrid", latched).publish(grid(20, 10, 0))
-    view = bench.load('MapDisplay { topic: "/map" }')
-    (display,) = view.scene.displays
+    display = bench.show('MapDisplay { topic: "/map" }')
     bench.wait(lambda: display.cells is not None)
     bench.wait.settled(bench.session)
     assert not display.cells.any()
@@ -141,18 +138,12 @@ def test_palettes_have_the_colors_of_rviz() -> None:
 
 
 def test_cells_are_squares(bench: SceneBench) -> None:
-    view = bench.load(
+    display = bench.show(
         'view: "TopDownOrtho"; GridCellsDisplay { topic: "/cells"; color: "#00ffff" }'
     )
-    (display,) = view.scene.displays
-    publisher = bench.robot.create_publisher("/cells", "nav_msgs/GridCells")
+    publisher = bench.publisher("/cells", "nav_msgs/GridCells")
     cell = {"header": {"frame_id": "map"}, "cell_width": 2.0, "cell_height": 2.0}
-
-    def send(message: dict[str, Any]) -> None:
-        before = display.received
-        bench.wait(lambda: publisher.publish(message) or display.received > before)
-
-    send({**cell, "cells": [{"x": 0.0, "y": 0.0, "z": 0.0}]})
+    bench.send(publisher, {**cell, "cells": [{"x": 0.0, "y": 0.0, "z": 0.0}]}, display)
     picture = bench.picture()
     cyan = (picture == (0, 255, 255)).all(axis=2).sum()
     assert 300 <= cyan <= 500, cyan  # 2 m by 2 m, at 10 pixels for a metre

@@ -43,8 +43,7 @@ def points(*places: tuple[float, float, float]) -> list[dict[str, float]]:
 @pytest.fixture
 def show(bench: SceneBench) -> Callable[..., Any]:
     """Publishes markers, and returns the display once it has received them."""
-    view = bench.load('MarkerArrayDisplay { topic: "/markers" }')
-    (display,) = view.scene.displays
+    display = bench.show('MarkerArrayDisplay { topic: "/markers" }')
     publisher = bench.publisher("/markers", "visualization_msgs/MarkerArray")
 
     return lambda *markers: bench.send(publisher, {"markers": list(markers)}, display)
@@ -280,8 +279,7 @@ def test_a_lifetime_ends(bench: SceneBench, show: Callable[..., Any]) -> None:
 def test_a_display_of_markers_shows_the_arrays_beside_its_topic(bench: SceneBench) -> None:
     from rosglass.comm.qos import QoS
 
-    view = bench.load('MarkerDisplay { topic: "/visualization_marker"; durability: "Volatile" }')
-    (display,) = view.scene.displays
+    display = bench.show('MarkerDisplay { topic: "/visualization_marker"; durability: "Volatile" }')
     arrays = bench.robot.create_publisher(
         "/visualization_marker_array", "visualization_msgs/MarkerArray", QoS.latched()
     )
@@ -516,8 +514,7 @@ def test_a_display_makes_no_timer_per_message(bench: SceneBench, show: Callable[
 
 
 def test_markers_of_a_publisher_that_is_gone_are_faded(bench: SceneBench) -> None:
-    view = bench.load('MarkerArrayDisplay { topic: "/markers" }')
-    (display,) = view.scene.displays
+    display = bench.show('MarkerArrayDisplay { topic: "/markers" }')
     publisher = bench.publisher("/markers", "visualization_msgs/MarkerArray")
     assert display.stale
     publisher.publish({"markers": [marker(1)]})

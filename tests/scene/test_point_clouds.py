@@ -58,7 +58,7 @@ class Shown:
     def __init__(self, bench: SceneBench, kind: str, settings: str = "") -> None:
         self.bench = bench
         body = f'view: "TopDownOrtho"; {kind}Display {{ topic: "/cloud"; size: 1; {settings} }}'
-        (self.display,) = bench.load(body).scene.displays
+        self.display = bench.show(body)
         self.publisher = bench.publisher("/cloud", self.display.MESSAGES[0])
 
     def send(self, message: dict[str, Any]) -> Any:
@@ -183,8 +183,7 @@ def test_boxes_and_spheres_have_the_light_of_rviz(show: Callable[..., Shown]) ->
 
 
 def test_a_square_faces_the_eye_across_to_y(bench: SceneBench) -> None:
-    view = bench.load('PointCloud2Display { topic: "/cloud"; size: 3 }')
-    (display,) = view.scene.displays
+    display = bench.show('PointCloud2Display { topic: "/cloud"; size: 3 }')
     publisher = bench.publisher("/cloud", "sensor_msgs/PointCloud2")
     publisher.publish(cloud([(0, 0, 0)]))
     bench.wait(lambda: display.points == 1)

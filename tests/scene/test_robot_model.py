@@ -36,8 +36,7 @@ def publish(bench: SceneBench, text: str) -> Any:
 
 
 def test_a_description_may_come_from_a_publisher_that_does_not_keep_it(bench: SceneBench) -> None:
-    view = bench.load("RobotModelDisplay {}")
-    (display,) = view.scene.displays
+    display = bench.show("RobotModelDisplay {}")
     publisher = bench.robot.create_publisher("/robot_description", "std_msgs/String")
     bench.wait(lambda: publisher.publish({"data": URDF}) or display.robotName)
 
@@ -74,16 +73,14 @@ def test_a_robot_is_shown_where_tf_has_its_links(bench: SceneBench) -> None:
 
 
 def test_a_prefix_names_the_frames(bench: SceneBench) -> None:
-    view = bench.load('RobotModelDisplay { tfPrefix: "/r1/" }')
-    (robot,) = view.scene.displays
+    robot = bench.show('RobotModelDisplay { tfPrefix: "/r1/" }')
     publish(bench, URDF)
     bench.place("r1/base_link", "r1/mast")
     bench.wait(lambda: shapes(robot) == {BOX, CYLINDER})
 
 
 def test_a_new_description_replaces_the_old_one(bench: SceneBench) -> None:
-    view = bench.load("RobotModelDisplay {}")
-    (robot,) = view.scene.displays
+    robot = bench.show("RobotModelDisplay {}")
     publisher = publish(bench, URDF)
     bench.wait(lambda: robot.robotName == "rover")
     publisher.publish({"data": '<robot name="other"><link name="only"/></robot>'})
@@ -102,8 +99,7 @@ def test_a_new_description_replaces_the_old_one(bench: SceneBench) -> None:
 def test_a_broken_description_is_an_error_in_words(
     bench: SceneBench, text: str, error: str
 ) -> None:
-    view = bench.load("RobotModelDisplay {}")
-    (robot,) = view.scene.displays
+    robot = bench.show("RobotModelDisplay {}")
     publish(bench, text)
     bench.wait(lambda: robot.statusLevel == "error")
     assert error in robot.statusText
@@ -272,8 +268,7 @@ def test_meshes_come_from_web_servers(bench: SceneBench) -> None:
 
     with WebServer() as web:
         web.files["/arm.stl"] = STL
-        view = bench.load("RobotModelDisplay {}")
-        (robot,) = view.scene.displays
+        robot = bench.show("RobotModelDisplay {}")
         publish(bench, with_meshes(*[f"{web.url}/arm.stl"] * 3, f"{web.url}/gone.stl?token=1"))
         bench.place("base_link")
         bench.wait(lambda: len(list(robot.root.drawables())) == 3)
@@ -323,8 +318,7 @@ def test_a_web_server_that_was_down_is_asked_again(
 
 @pytest.mark.usefixtures("cache")
 def test_missing_meshes_of_the_same_name_are_all_in_the_status(bench: SceneBench) -> None:
-    view = bench.load("RobotModelDisplay {}")
-    (robot,) = view.scene.displays
+    robot = bench.show("RobotModelDisplay {}")
     publish(bench, with_meshes("file:///left/hand.stl", "file:///right/hand.stl"))
     bench.wait(lambda: "/right/hand.stl: there is no such file" in robot.statusText)
     assert "/left/hand.stl: there is no such file" in robot.statusText
@@ -417,8 +411,7 @@ def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any
     from rosglass.scene.displays import display
 
     monkeypatch.setattr(display, "_FRAME_TIMEOUT_S", 0.5)
-    view = bench.load("RobotModelDisplay {}")
-    (robot,) = view.scene.displays
+    robot = bench.show("RobotModelDisplay {}")
     publish(bench, URDF)
     bench.place("mast")
     sent = itertools.count(1)
@@ -441,8 +434,7 @@ def test_a_robot_fades_when_one_of_its_joints_is_not_updated(
     from rosglass.scene.displays import display
 
     monkeypatch.setattr(display, "_FRAME_TIMEOUT_S", 0.5)
-    view = bench.load("RobotModelDisplay {}")
-    (robot,) = view.scene.displays
+    robot = bench.show("RobotModelDisplay {}")
     publish(bench, URDF)
 
     def move(*links: tuple[str, str]) -> None:
@@ -466,8 +458,7 @@ def test_a_robot_fades_when_one_of_its_joints_is_not_updated(
 
 
 def test_the_status_is_the_same_after_it_was_disabled(bench: SceneBench) -> None:
-    view = bench.load("RobotModelDisplay {}")
-    (robot,) = view.scene.displays
+    robot = bench.show("RobotModelDisplay {}")
     publish(bench, URDF.replace('<sphere radius="1"/>', '<mesh filename="file:///gone.stl"/>'))
     bench.place("base_link", "mast")
     bench.wait(lambda: "Mesh gone.stl" in robot.statusText and "Link" not in robot.statusText)
@@ -513,8 +504,7 @@ def test_links_share_the_mesh_that_they_name(
         return load(path, name, *rest)
 
     monkeypatch.setattr(robot_model, "load_mesh_cached", count)
-    view = bench.load("RobotModelDisplay {}")
-    (robot,) = view.scene.displays
+    robot = bench.show("RobotModelDisplay {}")
     bench.place("base", *(f"arm{at}" for at in range(30)))
     publish(bench, arms([triangles(tmp_path, "arm.stl", 2)] * 30))
     bench.wait(lambda: len(list(robot.root.drawables())) == 30)
@@ -538,8 +528,7 @@ def test_screenshots_wait_for_meshes_that_are_being_read(
 
     monkeypatch.setattr(robot_model, "load_mesh_cached", wait_at_the_third)
     monkeypatch.setattr(robot_model, "_PROGRESS_S", -1.0)
-    view = bench.load("RobotModelDisplay {}")
-    (robot,) = view.scene.displays
+    robot = bench.show("RobotModelDisplay {}")
     assert not is_loading(bench.window)
     meshes = [triangles(tmp_path, f"{name}.stl", 2) for name in ("first", "second", "third")]
     bench.place("base", "arm0", "arm1", "arm2", "arm3")
@@ -567,8 +556,7 @@ def test_all_meshes_of_a_robot_are_bounded(
     bench: SceneBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rosglass.scene.displays.robot_model.MAX_TRIANGLES", 5)
-    view = bench.load("RobotModelDisplay {}")
-    (robot,) = view.scene.displays
+    robot = bench.show("RobotModelDisplay {}")
     small, large = triangles(tmp_path, "small.stl", 2), triangles(tmp_path, "large.stl", 4)
     publish(bench, arms([small, large, small]))
     bench.wait(lambda: "Mesh large.stl: " in robot.statusText, lambda: robot.statusText)
@@ -591,8 +579,7 @@ def test_newest_of_several_descriptions_is_read(
         return load(text, *rest)
 
     monkeypatch.setattr(robot_model, "_load", count)
-    view = bench.load("RobotModelDisplay {}")
-    (robot,) = view.scene.displays
+    robot = bench.show("RobotModelDisplay {}")
     texts = [URDF.replace("rover", f"rover{number}") for number in range(6)]
     publisher = publish(bench, texts[0])
     bench.wait(lambda: read == texts[:1])
@@ -607,10 +594,9 @@ def test_newest_of_several_descriptions_is_read(
 def test_a_link_that_does_not_exist_is_an_error_with_its_line(
     bench: SceneBench, caplog: pytest.LogCaptureFixture
 ) -> None:
-    view = bench.load(
+    robot = bench.show(
         'RobotModelDisplay {\nComponent.onCompleted: setLinkEnabled("mats", false)\n}'
     )
-    (robot,) = view.scene.displays
 
     def errors() -> list[str]:
         return [f"{r.lineno}: {r.getMessage()}" for r in caplog.records if r.levelno >= 40]

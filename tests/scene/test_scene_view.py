@@ -68,8 +68,7 @@ def test_nothing_is_drawn_while_nothing_changes(bench: SceneBench) -> None:
 
 
 def test_the_window_is_drawn_once_with_a_new_frame(bench: SceneBench) -> None:
-    view = bench.load("AxesDisplay {}")
-    (axes,) = view.scene.displays
+    axes = bench.show("AxesDisplay {}")
     frames: list[int] = []
     bench.wait(lambda: bench.drawn() > 0)
     bench.picture()
@@ -314,8 +313,7 @@ def test_a_view_that_is_destroyed_does_not_wait_for_a_file_that_is_read(
 
 
 def test_a_display_in_a_frame_follows_it(bench: SceneBench) -> None:
-    view = bench.load('AxesDisplay { frame: "tool"; length: 0.3; radius: 0.1 }')
-    (axes,) = view.scene.displays
+    axes = bench.show('AxesDisplay { frame: "tool"; length: 0.3; radius: 0.1 }')
     bench.wait(lambda: "no transform from [tool]" in axes.statusText)
     assert axes.statusLevel == "error"
     assert not shaded(bench.picture(), 2).any()
@@ -336,8 +334,7 @@ def test_display_of_a_frame_fades_once_the_frame_is_not_published(
     from rosglass.scene.displays import display as displays
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 3600.0)
-    view = bench.load('AxesDisplay { frame: "tool" }')
-    (axes,) = view.scene.displays
+    axes = bench.show('AxesDisplay { frame: "tool" }')
     bench.wait(lambda: bench.move("tool", (0, 0, 2), 7) or axes.statusLevel == "ok")
     bench.moving.close()
     bench.wait(lambda: "[tool] may be somewhere else" in axes.statusText)
@@ -379,8 +376,7 @@ def test_transforms_in_the_namespace_of_the_node_have_publishers(
     from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_UNPUBLISHED_TIMEOUT_S", -1.0)
-    view = bench.load('AxesDisplay { frame: "tool" }')
-    (axes,) = view.scene.displays
+    axes = bench.show('AxesDisplay { frame: "tool" }')
     bench.session.shutdown()
     bench.session.init("view", "/robot1")
     broadcaster = TransformBroadcaster(bench.robot, "/robot1")
@@ -393,8 +389,7 @@ def test_transforms_in_the_namespace_of_the_node_have_publishers(
 
 
 def test_a_path_is_shown_and_fades_when_its_publisher_is_gone(bench: SceneBench) -> None:
-    view = bench.load('PathDisplay { topic: "/plan"; lineStyle: "Billboards"; lineWidth: 0.2 }')
-    (path,) = view.scene.displays
+    path = bench.show('PathDisplay { topic: "/plan"; lineStyle: "Billboards"; lineWidth: 0.2 }')
     publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
     poses = [
         {"pose": {"position": {"x": x, "y": 0.0, "z": 0.0}, "orientation": {"w": 1.0}}}
@@ -418,8 +413,7 @@ def test_a_path_is_shown_and_fades_when_its_publisher_is_gone(bench: SceneBench)
 
 
 def test_a_topic_of_another_type_is_an_error_in_words(bench: SceneBench) -> None:
-    view = bench.load('PathDisplay { topic: "/scan" }')
-    (path,) = view.scene.displays
+    path = bench.show('PathDisplay { topic: "/scan" }')
     publisher = bench.robot.create_publisher("/scan", "sensor_msgs/LaserScan")
 
     def send() -> bool:
@@ -525,8 +519,7 @@ def test_picking_finds_the_nearest_drawable(bench: SceneBench) -> None:
 
 
 def test_data_ahead_of_its_transform_is_not_an_error_for_a_second(bench: SceneBench) -> None:
-    view = bench.load('PathDisplay { topic: "/plan" }')
-    (path,) = view.scene.displays
+    path = bench.show('PathDisplay { topic: "/plan" }')
     publisher = bench.publisher("/plan", "nav_msgs/Path")
 
     def send(sec: int) -> None:
@@ -647,8 +640,7 @@ def test_frames_that_do_not_move_follow_another_fixed_frame(bench: SceneBench) -
 def test_frames_are_updated_at_the_interval_and_at_once_after_it_is_0(bench: SceneBench) -> None:
     from rosglass.scene.render.drawing import Mesh
 
-    view = bench.load("TFDisplay { updateInterval: 1000; showArrows: false }")
-    (frames,) = view.scene.displays
+    frames = bench.show("TFDisplay { updateInterval: 1000; showArrows: false }")
     sent = itertools.count(1)
 
     def move(x: float) -> list[str]:
@@ -673,8 +665,7 @@ def test_frames_are_updated_at_the_interval_and_at_once_after_it_is_0(bench: Sce
 
 
 def test_a_static_frame_is_shown_after_the_interval_in_which_it_came(bench: SceneBench) -> None:
-    view = bench.load("TFDisplay { updateInterval: 1 }")
-    (frames,) = view.scene.displays
+    frames = bench.show("TFDisplay { updateInterval: 1 }")
 
     def add(frame: str) -> None:
         bench.place(frame, at=(1, 0, 0))
@@ -786,8 +777,7 @@ def test_a_silent_link_above_the_fixed_frame_is_of_no_account(bench: SceneBench)
 def test_data_of_a_publisher_that_is_gone_stays_so_beside_another(bench: SceneBench) -> None:
     from rosglass.comm.qos import QoS
 
-    view = bench.load('PathDisplay { topic: "/plan" }')
-    (path,) = view.scene.displays
+    path = bench.show('PathDisplay { topic: "/plan" }')
 
     def publish(qos: Any = 1) -> Any:
         publisher = bench.publisher("/plan", "nav_msgs/Path", qos)
@@ -833,8 +823,7 @@ def test_displays_of_a_hidden_group_show_nothing_old_later(bench: SceneBench) ->
 def test_nothing_that_is_on_its_way_is_shown_after_a_change(bench: SceneBench, change: str) -> None:
     from rosglass.qt import QtCore
 
-    view = bench.load('PathDisplay { topic: "/plan" }')
-    (path,) = view.scene.displays
+    path = bench.show('PathDisplay { topic: "/plan" }')
     publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
     bench.wait(lambda: endpoint_of(path) is not None and publisher.subscription_count())
     queue = queue_of(path)
@@ -1258,8 +1247,7 @@ def test_an_image_beyond_the_limit_keeps_the_walls_of_a_map() -> None:
 
 
 def test_a_depth_that_a_config_may_not_have_is_named(bench: SceneBench) -> None:
-    view = bench.load('PathDisplay { topic: "/path" }')
-    (display,) = view.scene.displays
+    display = bench.show('PathDisplay { topic: "/path" }')
     notes = display.load_settings({"Topic": {"Value": "/path", "Depth": 5000}})
     assert notes == ["Depth: 5000 is out of range; 1000 is used, and the file keeps it"]
     assert display.depth == 1000

@@ -56,8 +56,7 @@ def test_a_volatile_display_says_that_earlier_messages_are_kept(bench: SceneBenc
 
     plan = bench.robot.create_publisher("/plan", "nav_msgs/Path", QoS.latched())
     plan.publish({"header": {"frame_id": "map"}})
-    view = bench.load('PathDisplay { topic: "/plan"; durability: "Volatile" }')
-    (display,) = view.scene.displays
+    display = bench.show('PathDisplay { topic: "/plan"; durability: "Volatile" }')
     bench.wait(lambda: "request transient local durability" in display.statusText)
     display.durability = "Transient Local"
     bench.wait(lambda: display.statusLevel == "ok")
@@ -121,8 +120,7 @@ def test_depth_images_that_have_no_publisher_are_named_where_a_calibration_came(
     from rosglass.qml.elements import element
 
     monkeypatch.setattr(element, "NO_PEER_MS", 1500)
-    view = bench.load('DepthCloudDisplay { topic: "/depth/image" }')
-    (display,) = view.scene.displays
+    display = bench.show('DepthCloudDisplay { topic: "/depth/image" }')
     info = bench.robot.create_publisher("/depth/camera_info", "sensor_msgs/CameraInfo")
     bench.wait(lambda: info.publish() or display.received)
     wanted = "No messages received on /depth/image: it has no publisher"
@@ -132,8 +130,7 @@ def test_depth_images_that_have_no_publisher_are_named_where_a_calibration_came(
 def test_a_policy_that_no_publisher_offers_is_named(bench: SceneBench) -> None:
     from rosglass.comm.qos import QoS, Reliability
 
-    view = bench.load('LaserScanDisplay { topic: "/scan"; reliability: "Reliable" }')
-    (display,) = view.scene.displays
+    display = bench.show('LaserScanDisplay { topic: "/scan"; reliability: "Reliable" }')
     qos = QoS(reliability=Reliability.BEST_EFFORT)
     scans = bench.robot.create_publisher("/scan", "sensor_msgs/LaserScan", qos)
     bench.wait(lambda: "best effort" in display.statusText, lambda: display.statusText)
@@ -318,8 +315,7 @@ def test_shown_data_fades_while_newer_data_waits_for_its_transform(bench: SceneB
 
 
 def test_shown_data_fades_while_newer_data_is_stamped_ahead(bench: SceneBench) -> None:
-    view = bench.load('PointStampedDisplay { topic: "/point" }')
-    (display,) = view.scene.displays
+    display = bench.show('PointStampedDisplay { topic: "/point" }')
     points = bench.robot.create_publisher("/point", "geometry_msgs/PointStamped")
 
     def send(ahead_ns: int) -> None:
@@ -577,8 +573,7 @@ def test_messages_wait_for_the_gui_thread_as_one_job() -> None:
 def test_a_message_that_was_held_back_fades_as_it_arrives(bench: SceneBench) -> None:
     from rosglass import Time
 
-    view = bench.load('LaserScanDisplay { topic: "/scan" }')
-    (display,) = view.scene.displays
+    display = bench.show('LaserScanDisplay { topic: "/scan" }')
     scan = bench.robot.create_publisher("/scan", "sensor_msgs/msg/LaserScan")
 
     def send(age: float) -> None:
