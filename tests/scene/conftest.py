@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
     from qt_waiting import QtWaiting
+    from rosmaster import RosMaster
     from scene_mouse import Hand
 
 HAVE_QT6 = find_spec("PySide6") is not None
@@ -204,6 +205,24 @@ def make_bench(wait: QtWaiting, tmp_path: Path) -> Callable[[str], SceneBench]:
 @pytest.fixture
 def bench(make_bench: Callable[[str], SceneBench]) -> Iterator[SceneBench]:
     made = make_bench("")
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def ros_master(tmp_path: Path) -> Iterator[RosMaster]:
+    from rosmaster import RosMaster
+
+    with RosMaster(tmp_path / "ros") as master:
+        yield master
+
+
+@pytest.fixture
+def ros1_bench(
+    make_bench: Callable[[str], SceneBench], ros_master: RosMaster
+) -> Iterator[SceneBench]:
+    """A bench in ROS 1, closed before the master, which its nodes unregister from."""
+    made = make_bench(ros_master.url)
     yield made
     made.close()
 

@@ -14,9 +14,6 @@ from rosglass.scene.render.drawing import Lines, Mesh
 from rosglass.scene.render.mesh_shapes import CONE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
     from conftest import SceneBench
 
 URDF = """<robot name="arm">
@@ -412,27 +409,21 @@ def test_the_dialog_offers_it_for_joint_states(bench: SceneBench, robot: Robot) 
 
 
 def test_in_ros1_the_description_is_a_parameter(
-    make_bench: Callable[[str], SceneBench], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ros1_bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosmaster import RosMaster
-
     from rosglass.scene.displays import effort
 
     monkeypatch.setattr(effort, "_RETRY_MS", 200)
-    with RosMaster(tmp_path) as master:
-        bench = make_bench(master.url)
-        try:
-            display = bench.load().scene.add(
-                "Effort", topic="/joint_states", robotDescription="arm_description"
-            )
-            bench.wait(lambda: display.statusLevel == "error")
-            assert "URDF: parameter /arm_description is not set on" in display.statusText
-            bench.robot.parameter_server.set("arm_description", URDF)  # type: ignore[attr-defined]
-            bench.wait(lambda: "Robot model parsed Ok" in display.statusText)
-            robot = Robot(bench)
-            robot.place("upper")
-            robot.send({"shoulder": 5.0})
-            bench.wait(lambda: len(arcs(display)) == 1)
-            assert display.statusLevel == "ok", display.statusText
-        finally:
-            bench.close()
+    bench = ros1_bench
+    display = bench.load().scene.add(
+        "Effort", topic="/joint_states", robotDescription="arm_description"
+    )
+    bench.wait(lambda: display.statusLevel == "error")
+    assert "URDF: parameter /arm_description is not set on" in display.statusText
+    bench.robot.parameter_server.set("arm_description", URDF)  # type: ignore[attr-defined]
+    bench.wait(lambda: "Robot model parsed Ok" in display.statusText)
+    robot = Robot(bench)
+    robot.place("upper")
+    robot.send({"shoulder": 5.0})
+    bench.wait(lambda: len(arcs(display)) == 1)
+    assert display.statusLevel == "ok", display.statusText

@@ -19,7 +19,6 @@ from rosglass.qt import QtCore, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
     from conftest import SceneBench
 
@@ -834,14 +833,8 @@ def test_invalid_description_topic_is_among_the_refused_settings(robot: Robot) -
 
 
 @pytest.fixture
-def ros1_robot(make_bench: Any, watch: Watch, tmp_path: Path) -> Iterator[Robot]:
-    from rosmaster import RosMaster
-
-    with RosMaster(tmp_path / "ros") as master:
-        bench = make_bench(master.url)
-        yield Robot(bench, watch)
-        # Before the master, which its nodes unregister from.
-        bench.close()
+def ros1_robot(ros1_bench: SceneBench, watch: Watch) -> Robot:
+    return Robot(ros1_bench, watch)
 
 
 @pytest.mark.parametrize("kind", ["Marker", "PointCloud2"])

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from inside import endpoint_of
-from rosmaster import RosMaster
 from rospy_markers import INSTALLED, RospyServer
 from scene_mouse import Hand, has_color
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
+
+    from rosmaster import RosMaster
 
     from conftest import SceneBench
 
@@ -815,16 +816,13 @@ def test_both_rviz_write_the_namespace_differently(bench: SceneBench) -> None:
 
 @pytest.fixture
 def ros1(
-    make_bench: Callable[[str], SceneBench], tmp_path: Path
+    ros1_bench: SceneBench, ros_master: RosMaster
 ) -> Iterator[tuple[SceneBench, RospyServer, RosMaster]]:
     if not INSTALLED:
         pytest.skip("not installed: sudo apt-get install python3-interactive-markers")
-    with RosMaster(tmp_path / "ros") as master:
-        server = RospyServer(master)
-        bench = make_bench(master.url)
-        yield bench, server, master
-        bench.close()
-        server.kill()
+    server = RospyServer(ros_master)
+    yield ros1_bench, server, ros_master
+    server.kill()
 
 
 def test_a_server_of_ros_1(ros1: tuple[SceneBench, RospyServer, RosMaster]) -> None:

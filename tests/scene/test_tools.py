@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from rosmaster import RosMaster
+
     from conftest import SceneBench
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -1225,17 +1227,6 @@ def test_default_topic_of_the_other_rviz_is_replaced(bench: SceneBench) -> None:
 # -- ROS 1 ---------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def ros1_bench(make_bench: Any, tmp_path: Path) -> Iterator[SceneBench]:
-    from rosmaster import RosMaster
-
-    with RosMaster(tmp_path / "ros") as master:
-        made = make_bench(master.url)
-        yield made
-        # Before the master, which its nodes unregister from.
-        made.close()
-
-
 def test_the_first_saved_view_begins_a_config_of_rviz_1(ros1_bench: SceneBench) -> None:
     view = ros1_bench.load()
     ros1_bench.wait(lambda: view.scene.node is not None)
@@ -1262,19 +1253,15 @@ def test_ros_1_has_topics_of_its_own(ros1_bench: SceneBench) -> None:
 
 
 def test_a_goal_of_an_action_is_not_sent_while_disconnected(
-    make_bench: Any, tmp_path: Path
+    ros1_bench: SceneBench, ros_master: RosMaster
 ) -> None:
-    from rosmaster import RosMaster
-
-    with RosMaster(tmp_path / "ros") as master:
-        bench = make_bench(master.url)
-        view = bench.load('SetGoalTool { name: "Go"; action: "/move_base" }\ntool: "Go"')
-        hand, goal = Hand(bench), view.tools.current
-        bench.wait(lambda: endpoint_of(goal) is not None)
-        master.kill()
-        bench.wait(lambda: bench.session.state != "connected")
-        hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
-        assert "not sent: the robot is not connected" in view.statusText
-        assert view.tool == "Interact"
-        master.start()
-        bench.close()
+    bench = ros1_bench
+    view = bench.load('SetGoalTool { name: "Go"; action: "/move_base" }\ntool: "Go"')
+    hand, goal = Hand(bench), view.tools.current
+    bench.wait(lambda: endpoint_of(goal) is not None)
+    ros_master.kill()
+    bench.wait(lambda: bench.session.state != "connected")
+    hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
+    assert "not sent: the robot is not connected" in view.statusText
+    assert view.tool == "Interact"
+    ros_master.start()
