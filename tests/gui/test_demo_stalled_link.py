@@ -16,12 +16,16 @@ pytest.importorskip("cv2", reason="the simulated robot and the cockpit need the 
 
 import rosglass
 from rosglass.demo.processes import VirtualScreen, start_robot
+from rosglass.qt import QT6
 from rosglass.wires.zenoh.router import Router
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-pytestmark = pytest.mark.xvfb
+pytestmark = [
+    pytest.mark.xvfb,
+    pytest.mark.skipif(not QT6, reason="the demo's cockpit needs Qt 6"),
+]
 
 
 class Side:

@@ -139,7 +139,7 @@ def test_endless_loop_is_ended_and_reported_with_its_position(
     (record,) = [r for r in caplog.records if "computed for" in r.getMessage()]
     assert f"{record.pathname}:{record.lineno}" == place
     assert record.getMessage() == panel(runner)
-    assert notes(runner, "heading")[0].startswith("The interface below goes on")
+    assert notes(runner, "heading")[0].startswith("The interface below continues")
 
 
 def test_a_handler_of_a_signal_from_python_is_ended_too(
