@@ -304,7 +304,8 @@ class Subscription(TopicElement):
         self._shown_at = self._steady() - held
         self._late = self._lateness(sample)
         self._age = held
-        self._judge_publisher(sample.publisher)
+        if self._outdated or not self._publishers:
+            self._judge_publisher(sample.publisher)
         # Update all properties before emitting the first signal.
         was_stale, self._stale = self._stale, self._outdated or self._is_old()
         if new_type:
