@@ -155,10 +155,14 @@ def await_graph(node: Node, least: float = 0.0) -> None:
         while time.monotonic() < min(max(changed_at + _QUIET_S[wire], began + least), since + 5.0):
             time.sleep(0.05)
 
+    def awaits_programs() -> bool:
+        in_time = time.monotonic() < began + _INTRODUCTION_S.get(wire, 0.0)
+        return in_time and node.unnamed_programs() > 0
+
     with node.on_graph_change(on_change), explained_wait(reason):
         wait_until_quiet(began)
-        if node.unnamed_programs():
-            while node.unnamed_programs() and time.monotonic() < began + _INTRODUCTION_S[wire]:
+        while awaits_programs():  # again if the router is lost after that
+            while awaits_programs():
                 time.sleep(0.05)
             on_change()  # the last received data is being handled
             wait_until_quiet(changed_at)

@@ -408,7 +408,7 @@ class Node(Handle):
 
         Over DDS, nodes on Fast DDS announce them up to four seconds after discovery; until then the
         graph is not complete. Over Zenoh it is 1 until the router has sent its graph, which takes
-        seconds with thousands of topics. Always 0 elsewhere.
+        seconds with thousands of topics, and while the router is lost. Always 0 elsewhere.
         """
         return 0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
 
 import pytest
@@ -11,6 +12,9 @@ from usage import memory
 from waiting import eventually
 
 from rosglass.comm import ConnectionState
+from rosglass.wires.zenoh.endpoints import Pump
+from rosglass.wires.zenoh.middleware import ZenohMiddleware
+from rosglass.wires.zenoh.router import Router
 
 TOPICS = 4_000
 #: Bytes of memory for each, and seconds of this process's CPU in all.
@@ -60,6 +64,61 @@ def test_thousands_of_announced_topics_cost_their_share(router, connect, run_com
     eventually(lambda: count(node) < 10, timeout=LONG)
     assert late.status().state is ConnectionState.CONNECTED
     assert time.process_time() - began < CPU
+
+
+def test_a_graph_is_incomplete_as_soon_as_it_is_connected(router, connect, monkeypatch):
+    """However late the thread runs that asks the router for the end of its tokens."""
+    released = threading.Event()
+    monkeypatch.setattr(
+        "rosglass.wires.zenoh.middleware.limit_silence", lambda _: released.wait(LONG)
+    )
+    node = connect("panel", "?domain=0")
+    try:
+        eventually(lambda: node.status().state is ConnectionState.CONNECTED, timeout=LONG)
+        assert node.unnamed_programs() == 1
+    finally:
+        released.set()
+    eventually(lambda: node.unnamed_programs() == 0, timeout=LONG)
+
+
+def test_a_router_that_is_linked_before_the_session_is_stored_counts(router, connect, monkeypatch):
+    """The worker polls while the session is being opened: it must look at that link later."""
+    polled, limited = threading.Event(), threading.Event()
+    poll = ZenohMiddleware.poll
+
+    def poll_and_report(self):
+        linked = self.is_linked()
+        poll(self)
+        if linked:
+            polled.set()
+
+    def start_slowly(*arguments):
+        started = Pump(*arguments)
+        if arguments[-1].endswith("links"):
+            assert polled.wait(LONG)
+        return started
+
+    monkeypatch.setattr(ZenohMiddleware, "poll", poll_and_report)
+    monkeypatch.setattr("rosglass.wires.zenoh.middleware.Pump", start_slowly)
+    monkeypatch.setattr("rosglass.wires.zenoh.middleware.limit_silence", lambda _: limited.set())
+    node = connect("panel", "?domain=0")
+    eventually(limited.is_set, timeout=LONG)
+    eventually(lambda: node.unnamed_programs() == 0, timeout=LONG)
+
+
+def test_a_graph_is_incomplete_while_its_router_is_lost(connect, free_port):
+    address = f"tcp/127.0.0.1:{free_port}"
+
+    def state():
+        return node.status().state, node.unnamed_programs()
+
+    with Router(address) as router:
+        node = connect("panel", "?domain=0", url=router.url)
+        eventually(lambda: state() == (ConnectionState.CONNECTED, 0), timeout=LONG)
+    # The node may connect once more to the router that closes.
+    eventually(lambda: state() == (ConnectionState.LOST, 1), timeout=LONG)
+    with Router(address):
+        eventually(lambda: state() == (ConnectionState.CONNECTED, 0), timeout=LONG)
 
 
 def test_topics_that_come_and_go_announce_the_same_tokens(router, connect):

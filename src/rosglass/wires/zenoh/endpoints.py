@@ -451,10 +451,13 @@ class Pump:
         source: A declaration with :data:`CHANNEL`; undeclaring it ends the thread.
         callback: Called with each item.
         name: Name of the thread.
+
+    Attributes:
+        idle: Whether the callback has had all items, and the thread waits for the next one.
     """
 
     def __init__(self, source: Any, callback: Callable[[Any], None], name: str) -> None:
-        self._source, self._callback = source, callback
+        self._source, self._callback, self.idle = source, callback, True
         # Not available any more once the source is undeclared.
         self._items = source.handler
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
@@ -478,11 +481,16 @@ class Pump:
 
     def _work(self) -> None:
         callback = self._callback
-        for item in self._items:
-            try:
-                callback(item)
-            except Exception:  # noqa: BLE001, PERF203 - a failure must not end the thread
-                _log.exception(_FAILURE)
+        for received in self._items:
+            self.idle, item = False, received
+            while item is not None:
+                with guarded(_log, _FAILURE):
+                    callback(item)
+                try:
+                    item = self._items.try_recv()
+                except zenoh.ZError:  # undeclared
+                    return
+            self.idle = True
 
 
 #: The channel of a :class:`Pump`, long enough never to be full while its thread lives.

@@ -78,8 +78,9 @@ _log = logging.getLogger("rosglass.ros2")
 _MIN_UNUSED_NUMBERS = 64
 #: Seconds between two heartbeats to the router.
 _HEARTBEAT_INTERVAL_S = 0.9
-#: Seconds that a router has to send all tokens: for 10,000, Zenoh needs 4 to 13.
-_HISTORY_TIMEOUT_S = 20.0
+#: Seconds until a query that ends after a router's tokens is sent again: for 10,000, Zenoh needs 4
+#: to 13. Zenoh ends it after 10 s without an answer as if there was one.
+_HISTORY_TIMEOUT_S = 9.0
 #: Number of publishers and clients whose topics and services are remembered.
 _MAX_NAMES = 20_000
 #: Number of invalid tokens to log.
@@ -123,8 +124,9 @@ class ZenohMiddleware(Middleware):
         self._opening = threading.Lock()
         self._no_token = f"@ros2_lv/{options.domain}/{self._id}/pulse"
         self._heartbeat = Heartbeat(self._no_token)
-        #: A query that ends after the tokens that the router had when it was linked.
-        self._history: Any = None
+        #: Whether tokens of a router are missing, a query that ends after those that it had when it
+        #: was linked, and when that was.
+        self._incomplete, self._history, self._linked_at = False, None, 0.0
         self._next_beat = 0.0
         #: Why the router refuses the session, and when to look for that again.
         self._refusal, self._next_refusal = "", time.monotonic() + _REFUSAL_DELAY_S
@@ -194,16 +196,18 @@ class ZenohMiddleware(Middleware):
         return Status(ConnectionState.CONNECTING, f"no answer from {self._address}, {retry}")
 
     def unnamed(self) -> int:
-        """Return 1 until the router has sent all its tokens, then 0."""
+        """Return 1 until the graph has all tokens of the router, and while that is lost; else 0."""
         with self._lock:
-            if self._history is not None:
+            # The answer does not cover links that have been opened since.
+            if self._history is not None and not self._linked:
                 try:
-                    over = self._history.try_recv() is not None  # an error: the timeout
+                    if self._history.try_recv() is not None:  # an error: the timeout
+                        self._history = None
                 except zenoh.ZError:  # the end of the answer
-                    over = True
-                if over:
-                    self._history = None
-            return int(self._history is not None)
+                    # All tokens are in the pump's channel.
+                    if any(self._links.values()) and all(pump.idle for pump in self._pumps):
+                        self._incomplete, self._history = False, None
+            return int(self._incomplete)
 
     def announce(self, node: NodeName) -> Handle:
         """Declare the node's token."""
@@ -353,8 +357,6 @@ class ZenohMiddleware(Middleware):
                 Pump(events, self._on_transport, f"{self._address} links"),
                 Pump(tokens, self._on_token, f"{self._address} tokens"),
             ]
-        if not self._is_peer:
-            self._await_history(session)
         with self._lock:
             if not self._closed:
                 self._session = session
@@ -365,20 +367,28 @@ class ZenohMiddleware(Middleware):
             declaration.attach(session)
 
     def _watch_links(self) -> None:
-        """Detect links that are dead but not closed."""
+        """Detect links that are dead but not closed, and when the router has sent its tokens."""
+        now = time.monotonic()
         with self._lock:
             session, routers = self._session, any(self._links.values())
+            if session is None:
+                return
             fresh, self._linked = self._linked, False
-        if session is None:
-            return
+            if fresh:
+                self._history, self._linked_at = None, now
+            queries = routers and self._incomplete and self._history is None
         if fresh:
             limit_silence(session)
-            if routers:
-                self._await_history(session)
+        if queries:
+            with suppress(zenoh.ZError):  # the session is closed
+                history = self.query_router(_HISTORY_TIMEOUT_S)
+                with self._lock:
+                    self._history = history
         # Answers queue behind the tokens.
-        if not routers or self.unnamed():
+        awaits_tokens = self.unnamed() and now < self._linked_at + _HISTORY_TIMEOUT_S
+        if not routers or awaits_tokens:
             self._heartbeat.pause()
-        elif (now := time.monotonic()) >= self._next_beat:
+        elif now >= self._next_beat:
             self._next_beat = now + _HEARTBEAT_INTERVAL_S
             self._heartbeat.beat(session, now)
             if self._heartbeat.silent:
@@ -407,14 +417,6 @@ class ZenohMiddleware(Middleware):
 
         threading.Thread(target=look, name=f"{self._address} refusal", daemon=True).start()
 
-    def _await_history(self, session: zenoh.Session) -> None:
-        """Send a query without result to a router; it ends after all tokens sent before it."""
-        with suppress(zenoh.ZError):  # the session is closed
-            channel = zenoh.handlers.FifoChannel(4)
-            history = session.liveliness().get(self._no_token, channel, timeout=_HISTORY_TIMEOUT_S)
-            with self._lock:
-                self._history = history
-
     def _increase_version(self) -> None:
         # next() is atomic: a new number on every thread.
         self.version = next(self._versions)
@@ -426,8 +428,10 @@ class ZenohMiddleware(Middleware):
                 self._settled = time.monotonic() + _SETTLING_TIME_S
                 self._links[zid] = event.transport.whatami == zenoh.WhatAmI.ROUTER
                 self._was_connected = self._linked = True
-            else:
-                self._links.pop(zid, None)
+                # At once: from now on, status() calls the graph connected.
+                self._incomplete |= any(self._links.values())
+            elif self._links.pop(zid, False) and not any(self._links.values()):
+                self._incomplete = True
         self._increase_version()
         self._changed()
 
