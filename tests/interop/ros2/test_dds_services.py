@@ -225,9 +225,14 @@ def test_replies_have_an_identity_as_soon_as_another_vendors_participant_is_know
 
     monkeypatch.setattr(cyclone_identity, "write_reply", write_reply)
     bystander = start_services("dora", "bystander", ())
-    eventually(lambda: "/dora/bystander" in map(str, node.nodes()), what="dora's node")
     with node.create_service_server("/sum", types[ADD], lambda r: {"sum": r.a + r.b}):
         client = start_services("cyclone", "header_client", ())
+        # The participant counts, not its node, which is announced later.
+        eventually(
+            lambda: call_us(client, "/sum", sums=[[2, 1]]) == [3] and identities,
+            what="dora's participant",
+        )
+        identities.clear()
         assert call_us(client, "/sum", sums=[[n, 1] for n in range(5)]) == [1, 2, 3, 4, 5]
     assert len(identities) == 5
     client.end()
