@@ -170,3 +170,14 @@ def test_each_panel_shows_what_it_shows_over_rviz(tmp_path: Path) -> None:
     finally:
         for demo in demos:
             demo.close()
+
+
+def test_module_answers_help_and_refuses_options() -> None:
+    command = [sys.executable, "-m", "rosglass.demo.view"]
+    shown = subprocess.run([*command, "--help"], capture_output=True, text=True, check=True)
+    assert "rosglass view" in shown.stdout
+    refused = subprocess.run(
+        [*command, "--seconds", "5"], capture_output=True, text=True, check=False
+    )
+    assert refused.returncode == 2
+    assert "unrecognized arguments" in refused.stderr

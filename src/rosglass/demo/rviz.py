@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+from argparse import ArgumentParser
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -158,6 +159,7 @@ def _wait(program: Child, received: list[int]) -> int:
 
 
 if __name__ == "__main__":
+    ArgumentParser(description=__doc__).parse_args()  # it has no options
     try:
         sys.exit(main())
     except Error as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import sys
+from argparse import ArgumentParser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,6 +49,7 @@ def _start_router(stack: ExitStack) -> str:
 
 
 if __name__ == "__main__":
+    ArgumentParser(description=__doc__).parse_args()  # it has no options
     try:
         sys.exit(main())
     except Error as error:

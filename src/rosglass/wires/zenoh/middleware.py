@@ -79,7 +79,7 @@ _MIN_UNUSED_NUMBERS = 64
 #: Seconds between two heartbeats to the router.
 _HEARTBEAT_INTERVAL_S = 0.9
 #: Seconds until a query that ends after a router's tokens is sent again: for 10,000, Zenoh needs 4
-#: to 13. Zenoh ends it after 10 s without an answer as if there was one.
+#: to 13. Routers end unanswered ones after their `routing/interests/timeout` as if answered.
 _HISTORY_TIMEOUT_S = 9.0
 #: Number of publishers and clients whose topics and services are remembered.
 _MAX_NAMES = 20_000
