@@ -18,6 +18,7 @@ from rosglass.wires.zenoh.router import Router
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES, TARGET = ROOT / "examples", ROOT / "docs" / "images" / "examples"
+CONTROLS = ROOT / "docs" / "images" / "controls"
 PARTNERS = {"figure4": "pose_prediction.py", "figure5": "humanoid.py"}
 #: Seconds until an example shows what it is about, where it is more than usual.
 AFTER = {"replay": 12, "image_publisher": 8, "camera": 8}
@@ -30,8 +31,9 @@ MOST = 40_000
 
 def main(names: list[str]) -> None:
     """Take these screenshots; all of them without names."""
-    TARGET.mkdir(parents=True, exist_ok=True)
-    patterns = ("*.qml", "ros1/*.qml", "paper/figure*.qml")
+    for folder in (TARGET, CONTROLS):
+        folder.mkdir(parents=True, exist_ok=True)
+    patterns = ("*.qml", "ros1/*.qml", "paper/figure*.qml", "controls/*.qml")
     files = [file for pattern in patterns for file in sorted(EXAMPLES.glob(pattern))]
     with Router("tcp/127.0.0.1:0") as router:
         commands = [[*ROSGLASS, "robot", "--url", router.url]]
@@ -44,7 +46,8 @@ def main(names: list[str]) -> None:
             for file in files:
                 if names and file.stem not in names:
                     continue
-                target, after = TARGET / f"{file.stem}.png", AFTER.get(file.stem, 4)
+                folder = CONTROLS if file.parent.name == "controls" else TARGET
+                target, after = folder / f"{file.stem}.png", AFTER.get(file.stem, 4)
                 picture = ["--screenshot", str(target), "--after", str(after)]
                 command = [*ROSGLASS, "run", str(file), "--url", router.url, *picture]
                 subprocess.run(command, check=True)

@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rosglass.controls import modules as controls
 from rosglass.qml.elements import ros1, ros2
 from rosglass.qml.run import modules
 from rosglass.qt import QtCore
@@ -38,6 +39,9 @@ Module {
 def files() -> dict[Path, str]:
     """Return what the files must hold."""
     found = {FOLDER6 / "RosScene" / "plugins.qmltypes": _module("RosScene", scene.load_types())}
+    found[Path(controls.__file__).parent / "imports/RosControls/plugins.qmltypes"] = _module(
+        "RosControls", controls.TYPES
+    )
     for uri, module in (("Ros", ros1), ("Ros2", ros2)):
         found[FOLDER / uri / "plugins.qmltypes"] = _module(uri, module.TYPES)
         found[FOLDER / uri / "Native" / "plugins.qmltypes"] = _module(

@@ -36,12 +36,13 @@ RANK = {
     "images": 6,
     "qt": 6,
     "qml": 9,
-    "overlay": 10,
+    "controls": 10,
+    "overlay": 11,
     # RViz's view and rosglass's own: neither knows the other.
-    "rviz": 11,
-    "scene": 11,
-    "cli": 13,
-    "demo": 12,
+    "rviz": 12,
+    "scene": 12,
+    "cli": 14,
+    "demo": 13,
 }
 #: The folders of a large package, from the lowest; each imports itself and those before it.
 ROOMS = {"qml": ["engine", "elements", "run"]}

@@ -152,7 +152,7 @@ class Watcher(QtCore.QObject):
 
 _MODULE = re.compile(r'module "([\w.]+)"(?: version ([\d.]+))?')
 _UNVERSIONED = re.compile(r"\s*import\s+[\w.]+\s*(?:as\b|;|//|$)")
-_OURS = {"Ros", "Ros2"}
+_OURS = {"Ros", "Ros2", "RosControls"}
 _TYPE = re.compile(r"^(\w+) is not a type$")
 #: Types that only one of our modules has -> the module, and the type's name in the other one.
 _ONLY_IN = {
@@ -256,7 +256,12 @@ def _advice(text: str) -> str:
 
 
 #: Module -> the package above this one that registers its types, once a file imports it.
-_REGISTERED_BY = {"RosScene": "rosglass.scene.app.modules", "RosglassDemo": "rosglass.demo.app"}
+_REGISTERED_BY = {"RosControls": "rosglass.controls.modules"}
+if QT6:
+    _REGISTERED_BY |= {
+        "RosScene": "rosglass.scene.app.modules",
+        "RosglassDemo": "rosglass.demo.app",
+    }
 #: The QML file of a closable item that is only as large as its text.
 PANEL = Path(__file__).with_name("ErrorPanel.qml")
 #: Headings of an ErrorView, for what is below it.
@@ -431,7 +436,7 @@ class LiveFile(QtCore.QObject):
         engine = self._new_engine() if self._used else self.engine
         self._used = True
         paths = engine.importPathList()
-        if QT6 and not self._is_own:
+        if not self._is_own:
             for module in sorted(imported_modules(self.path, paths) & _REGISTERED_BY.keys()):
                 import_module(_REGISTERED_BY[module]).register()
         component = QtQml.QQmlComponent(engine, QtCore.QUrl.fromLocalFile(str(self.path)))

@@ -120,8 +120,9 @@ def import_folder(place: str | os.PathLike[str]) -> Path:
 
 #: Directories for the QML import path: modules for all Qt versions, and those for this version
 #: only. The types also need :func:`register`.
-IMPORT_PATHS = tuple(
-    Path(__file__).parents[1] / name for name in ("imports", "imports6" if QT6 else "imports5")
+IMPORT_PATHS = (
+    *(Path(__file__).parents[1] / name for name in ("imports", "imports6" if QT6 else "imports5")),
+    Path(__file__).parents[2] / "controls/imports",
 )
 
 

@@ -1,0 +1,75 @@
+// A titled frame that shows by itself when what is in it is out of date: dimmed, with a red edge, and
+// in words. Every control is one.
+import QtQuick 2.15
+
+Item {
+    id: frame
+
+    property string title
+    // What it shows: a LiveTopic, Subscription, TfTransform ..., or anything with `stale` and `age`.
+    property var source: null
+    // Whether what is shown is out of date, or nothing has been received.
+    property bool stale: source ? source.stale : false
+    // Seconds since what is shown was received; negative for never.
+    property real age: source && source.age !== undefined ? source.age : 0
+    // Why nothing is received, or it cannot be shown; empty without a problem.
+    property string problem: source && source.problem ? source.problem : ""
+    // A short text beside the title, while nothing is wrong.
+    property string note
+    // Whether title and edge are drawn.
+    property bool framed: true
+    // Pixels that the content wants, for layouts.
+    property real contentWidth: 160 * Theme.size
+    property real contentHeight: 60 * Theme.size
+    // What is wrong, in words; empty if nothing is.
+    readonly property string status: problem ? problem
+        : !stale ? ""
+        : age < 0 ? qsTr("NO DATA YET")
+        : qsTr("OLD: %1 s").arg(age < 10 ? age.toFixed(1) : age.toFixed(0))
+
+    default property alias content: body.data
+    readonly property alias body: body
+
+    implicitWidth: contentWidth + 2 * inset
+    implicitHeight: top_ + contentHeight + inset
+
+    readonly property real top_: framed ? Theme.small * 1.5 + Theme.gap * 1.1 : 0
+    readonly property real inset: framed ? Theme.gap : 0
+    readonly property bool wrong: stale || problem !== ""
+
+    Accessible.role: Accessible.Grouping
+    Accessible.name: title
+    Accessible.description: status
+
+    Rectangle {
+        anchors.fill: parent
+        visible: frame.framed
+        color: Theme.panel
+        radius: Theme.radius
+        border { color: frame.wrong ? Theme.bad : Theme.edge; width: frame.wrong ? 2 : 1 }
+    }
+    ThemeText {
+        id: heading
+        visible: frame.framed
+        anchors { left: parent.left; top: parent.top; leftMargin: Theme.gap; topMargin: Theme.gap * 0.6 }
+        width: Math.min(implicitWidth, Math.max(0, frame.width - 2 * Theme.gap - (aside.text ? Math.min(aside.implicitWidth, frame.width / 2) + Theme.gap : 0)))
+        text: frame.title
+        color: Theme.dim
+        font { pixelSize: Theme.small; weight: Font.DemiBold; letterSpacing: 0.8; capitalization: Font.AllUppercase }
+    }
+    ThemeText {
+        id: aside
+        anchors { right: parent.right; rightMargin: Theme.gap; top: parent.top; topMargin: Theme.gap * 0.6 }
+        width: Math.min(implicitWidth, Math.max(0, frame.width - 2 * Theme.gap - (frame.framed && frame.title ? Math.min(heading.implicitWidth, frame.width / 2) + Theme.gap : 0)))
+        z: 1
+        text: frame.status || frame.note
+        color: frame.wrong ? Theme.bad : Theme.dim
+        font { pixelSize: Theme.small; weight: frame.wrong ? Font.Bold : Font.Normal }
+        horizontalAlignment: Text.AlignRight
+    }
+    Item {
+        id: body
+        anchors { top: parent.top; topMargin: frame.top_; left: parent.left; right: parent.right; bottom: parent.bottom; leftMargin: frame.inset; rightMargin: frame.inset; bottomMargin: frame.inset }
+        opacity: frame.stale ? 0.35 : 1
+    }
+}

@@ -1,0 +1,65 @@
+// The colours and sizes of all controls. `mode` selects the colours; `scale` enlarges everything.
+pragma Singleton
+import QtQuick 2.15
+
+QtObject {
+    id: theme
+
+    // "dark" for rooms, "bright" for sunlight, "contrast" for eyes that need more.
+    property string mode: "dark"
+    // 1 for a desktop; larger for touch with gloves, or a 4K screen that is not scaled.
+    property real scale: 1
+
+    readonly property var modes: ["dark", "bright", "contrast"]
+    readonly property var palette_: ({
+        dark: {
+            background: "#070b10", panel: "#0e151d", edge: "#1d2935", text: "#e6eef5", dim: "#8fa3b5",
+            faint: "#3a4a59", track: "#16202a", accent: "#3fd2e8", good: "#41d98a", warn: "#ffb63d",
+            bad: "#ff5566", onAccent: "#04141a", shade: "#c0070b10"
+        },
+        bright: {
+            background: "#eef1f4", panel: "#ffffff", edge: "#b7c0c9", text: "#0b1117", dim: "#4a5763",
+            faint: "#9aa6b1", track: "#dde3e9", accent: "#00647a", good: "#0a6b38", warn: "#8a5200",
+            bad: "#b3001b", onAccent: "#ffffff", shade: "#c0ffffff"
+        },
+        contrast: {
+            background: "#000000", panel: "#000000", edge: "#ffffff", text: "#ffffff", dim: "#ffffff",
+            faint: "#a0a0a0", track: "#303030", accent: "#00ffff", good: "#00ff66", warn: "#ffd400",
+            bad: "#ff8080", onAccent: "#000000", shade: "#e0000000"
+        }
+    })
+    readonly property var colors: palette_[mode] || palette_.dark
+
+    readonly property color background: colors.background
+    readonly property color panel: colors.panel
+    readonly property color edge: colors.edge
+    readonly property color text: colors.text
+    readonly property color dim: colors.dim
+    readonly property color faint: colors.faint
+    readonly property color track: colors.track
+    readonly property color accent: colors.accent
+    readonly property color onAccent: colors.onAccent
+    readonly property color good: colors.good
+    readonly property color warn: colors.warn
+    readonly property color bad: colors.bad
+    readonly property color shade: colors.shade
+
+    // Pixels.
+    readonly property real size: scale >= 0.5 && scale <= 8 ? scale : 1
+    readonly property int small: Math.round(11 * size)
+    readonly property int normal: Math.round(13 * size)
+    readonly property int large: Math.round(20 * size)
+    readonly property int gap: Math.round(10 * size)
+    readonly property int radius: Math.round(8 * size)
+    // The least height of what a finger presses.
+    readonly property int touch: Math.round(36 * size)
+
+    onModeChanged: {
+        if (!palette_[mode])
+            console.error("Theme.mode is one of " + modes.join(", ") + "; got \"" + mode + "\"")
+    }
+    onScaleChanged: {
+        if (size !== scale)
+            console.error("Theme.scale is from 0.5 to 8; got " + scale)
+    }
+}

@@ -1,0 +1,35 @@
+// A button of the theme; `tint` is its colour, e.g. Theme.bad for what cannot be undone.
+import QtQuick 2.15
+import QtQuick.Templates 2.15 as T
+
+T.AbstractButton {
+    id: button
+
+    property color tint: Theme.accent
+
+    implicitWidth: Math.max(Theme.touch, label.implicitWidth + 2 * Theme.gap)
+    implicitHeight: Theme.touch
+    focusPolicy: Qt.StrongFocus
+    hoverEnabled: true
+    Accessible.role: checkable ? Accessible.CheckBox : Accessible.Button
+    Accessible.name: text
+    Accessible.onPressAction: click()
+    Keys.onReturnPressed: click()
+    Keys.onEnterPressed: click()
+
+    contentItem: ThemeText {
+        id: label
+        text: button.text
+        color: !button.enabled ? Theme.faint : button.down || button.checked ? Theme.onAccent : button.tint
+        font.weight: Font.DemiBold
+        horizontalAlignment: Text.AlignHCenter
+        verticalAlignment: Text.AlignVCenter
+    }
+    background: Rectangle {
+        radius: Theme.radius
+        color: !button.enabled ? "transparent" : button.down || button.checked ? button.tint
+            : button.hovered ? Theme.track : "transparent"
+        border { color: button.enabled ? button.tint : Theme.faint; width: 1 }
+        FocusRing { item: parent; visible: button.visualFocus }
+    }
+}

@@ -1,0 +1,25 @@
+"""Registers the QML module ``RosControls 1.0``."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from rosglass.controls.live_topic import LiveTopic
+from rosglass.qt import QtCore, QtQml
+
+__all__ = ["TYPES", "register"]
+
+#: The types that are written in Python; ``imports/RosControls`` has those that are written in QML.
+TYPES: dict[str, type[QtCore.QObject]] = {
+    "LiveTopic": LiveTopic,
+}
+
+
+@cache
+def register() -> None:
+    """Register the types with Qt; only the first call has an effect."""
+    # PySide takes texts for names, which its hints do not say.
+    register_type: Any = QtQml.qmlRegisterType
+    for name, kind in TYPES.items():
+        register_type(kind, "RosControls", 1, 0, name)
