@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 from rosglass.controls.live_topic import LiveTopic
+from rosglass.controls.twist_command import TwistCommand
 from rosglass.qt import QtCore, QtQml
 
 __all__ = ["TYPES", "register"]
@@ -13,6 +14,7 @@ __all__ = ["TYPES", "register"]
 #: The types that are written in Python; ``imports/RosControls`` has those that are written in QML.
 TYPES: dict[str, type[QtCore.QObject]] = {
     "LiveTopic": LiveTopic,
+    "TwistCommand": TwistCommand,
 }
 
 

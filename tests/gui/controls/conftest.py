@@ -24,12 +24,12 @@ class ControlBench:
         self._bench, self._wait = running, wait
         self.robot, self.engine, self.window = running.robot, running.engine, None
 
-    def show(self, control: str, width: int = 400, height: int = 300) -> Any:
+    def show(self, control: str, width: int = 400, height: int = 300, imports: str = "") -> Any:
         """Show a control, such as ``Battery { topic: "/battery" }``; return it."""
         self.window = self._bench.load(
             f"Window {{ width: {width}; height: {height}; visible: true; color: Theme.background\n"
             f"property Item control: made\nItem {{ anchors.fill: parent\n{named(control)} }} }}",
-            "import QtQuick 2.15\nimport QtQuick.Window 2.15\nimport RosControls 1.0",
+            f"import QtQuick 2.15\nimport QtQuick.Window 2.15\nimport RosControls 1.0\n{imports}",
         )
         self._wait(self.window.isExposed)
         return self.window.property("control")
