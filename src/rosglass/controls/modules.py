@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 from rosglass.controls.live_topic import LiveTopic
+from rosglass.controls.live_value import LiveValue
 from rosglass.controls.twist_command import TwistCommand
 from rosglass.qt import QtCore, QtQml
 
@@ -15,6 +16,7 @@ __all__ = ["TYPES", "register"]
 TYPES: dict[str, type[QtCore.QObject]] = {
     "LiveTopic": LiveTopic,
     "TwistCommand": TwistCommand,
+    "LiveValue": LiveValue,
 }
 
 
