@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parent))
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 
 class ControlBench:
@@ -23,6 +26,7 @@ class ControlBench:
     def __init__(self, running: Any, wait: Any) -> None:
         self._bench, self._wait = running, wait
         self.robot, self.engine, self.window = running.robot, running.engine, None
+        self.engine_session = running.session
 
     def show(self, control: str, width: int = 400, height: int = 300, imports: str = "") -> Any:
         """Show a control, such as ``Battery { topic: "/battery" }``; return it."""
@@ -62,3 +66,12 @@ def controls(running: Any, wait: Callable[..., None], tmp_path: Path) -> Iterato
 
     register()
     return ControlBench(running, wait)
+
+
+@pytest.fixture
+def live_controls(live: Any, wait: Callable[..., None]) -> ControlBench:
+    """A bench to show controls on, connected to the robot over a real middleware."""
+    from rosglass.controls import register
+
+    register()
+    return ControlBench(live, wait)

@@ -28,4 +28,13 @@ T.TextField {
         color: Theme.track
         border { color: field.problem ? Theme.bad : field.activeFocus ? Theme.accent : Theme.edge; width: field.activeFocus ? 2 : 1 }
     }
+
+    ThemeText {
+        anchors { fill: parent; leftMargin: field.leftPadding; rightMargin: field.rightPadding }
+        visible: field.length === 0 && field.preeditText === ""
+        text: field.placeholderText
+        color: field.placeholderTextColor
+        font: field.font
+        verticalAlignment: Text.AlignVCenter
+    }
 }
