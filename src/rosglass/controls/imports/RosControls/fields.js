@@ -1,0 +1,124 @@
+// Fields of messages as texts, and texts as fields; for controls that show or edit any type.
+.pragma library
+
+// A name within a namespace; absolute names stay as they are.
+function resolve(ns, name) {
+    return ns && name && name[0] !== "/" && name[0] !== "~" ? ns.replace(/\/+$/, "") + "/" + name : name
+}
+
+// A text of a robot, in a length that a control has room for.
+function bounded(text, most) {
+    const limit = most || 300, whole = String(text === undefined || text === null ? "" : text).slice(0, 4 * limit)
+    return whole.length > limit ? whole.slice(0, limit) + " ..." : whole
+}
+
+function isList(value) {
+    return Array.isArray(value) || (value !== null && typeof value === "object" && typeof value["#index"] === "number")
+}
+
+function isMessage(value) {
+    return value !== null && typeof value === "object" && !isList(value)
+}
+
+// Calls visit(path, value) with each field that is not a message itself, up to `most`; returns the number of the others.
+function walk(message, visit, most) {
+    let count = 0
+    function enter(value, path) {
+        for (const name of Object.keys(value)) {
+            const inner = value[name], here = path ? path + "." + name : name
+            if (isMessage(inner))
+                enter(inner, here)
+            else if (++count <= most)
+                visit(here, inner)
+        }
+    }
+    if (isMessage(message))
+        enter(message, "")
+    return Math.max(0, count - most)
+}
+
+function shown(value) {
+    if (typeof value === "number" && isFinite(value) && !Number.isInteger(value))
+        return String(Number(value.toPrecision(6)))
+    return isList(value) ? "[" + value.length + "]" : bounded(value, 60)
+}
+
+// A message in one line: "a.b 3.2 · c true".
+function summary(message, most) {
+    const parts = []
+    const left = walk(message, (path, value) => parts.push(path + " " + shown(value)), most)
+    return parts.join(" · ") + (left ? " · +" + left : "")
+}
+
+// The fields of a message to edit: [{path, kind, text}]; kind is "bool", "number", "text" or "json".
+function entries(message, most) {
+    const made = []
+    const left = walk(message, function (path, value) {
+        const kind = isList(value) ? "json" : typeof value === "boolean" ? "bool" : typeof value === "number" ? "number" : "text"
+        const plain = kind === "json" && !Array.isArray(value) ? value.toArray() : value
+        made.push({ path: path, kind: kind, text: kind === "json" ? JSON.stringify(plain) : String(value) })
+    }, most)
+    return { list: made, left: left }
+}
+
+// The value that a text stands for; throws an Error in words.
+function parse(kind, text) {
+    const given = text.trim()
+    if (kind === "text")
+        return text
+    if (kind === "bool") {
+        if (given !== "true" && given !== "false")
+            throw new Error("is true or false")
+        return given === "true"
+    }
+    if (kind === "number") {
+        const special = { nan: NaN, inf: Infinity, "+inf": Infinity, "-inf": -Infinity }[given.toLowerCase()]
+        const number = special === undefined ? Number(given) : special
+        if (given === "" || (isNaN(number) && special === undefined))
+            throw new Error("is not a number")
+        // Longer integers than JavaScript's keep all their digits as text.
+        return Number.isInteger(number) && !Number.isSafeInteger(number) ? given : number
+    }
+    try {
+        const value = JSON.parse(given || "[]")
+        if (Array.isArray(value))
+            return value
+    } catch (error) {}
+    throw new Error("is not a list, such as [1, 2]")
+}
+
+// Sets the field with this path in a message made of plain objects.
+function assign(message, path, value) {
+    const names = path.split(".")
+    let at = message
+    for (const name of names.slice(0, -1))
+        at = at[name] = at[name] || {}
+    at[names[names.length - 1]] = value
+}
+
+// Why a server refused, by its response; empty if it did not. Responses say so by `success` (std_srvs and most
+// others) or `ok`, and give the reason as `message`, `status_message`, `error_message`, `reason` or `error`.
+function refusal(response) {
+    if (!isMessage(response))
+        return ""
+    const has = name => Object.prototype.hasOwnProperty.call(response, name)
+    for (const name of ["success", "ok"]) {
+        if (has(name) && response[name] === false) {
+            for (const reason of ["message", "status_message", "error_message", "reason", "error"])
+                if (has(reason) && typeof response[reason] === "string" && response[reason].trim() !== "")
+                    return bounded(response[reason])
+            return "it gave no reason"
+        }
+    }
+    return ""
+}
+
+// What a response says for a reader: its message, or all its fields.
+function answer(response) {
+    if (!isMessage(response))
+        return ""
+    const names = Object.keys(response)
+    if (names.indexOf("message") >= 0 && typeof response.message === "string" && names.indexOf("success") >= 0)
+        return bounded(response.message)
+    return summary(response, 8)
+}
