@@ -1,0 +1,112 @@
+"""The control ActionPanel."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import pytest
+from counting import Counter
+from hands import click, write
+
+pytestmark = pytest.mark.both_qt
+TYPE = "example_interfaces/action/Fibonacci"
+
+
+@pytest.fixture
+def counter(controls: Any) -> Any:
+    made = Counter(controls.robot, "local")
+    yield made
+    made.go.set()
+    made.stop.set()
+
+
+def test_goal_shows_progress_and_result(controls: Any, counter: Any, wait: Any) -> None:
+    counter.offer()
+    panel = controls.show("""ActionPanel {
+        action: "/count"; goal: ({order: 6})
+        progressOf: function(feedback) { return feedback.sequence.length / 6 }
+        describe: function(message) { return message.sequence.length + " numbers" }
+        property var ends: []
+        onFinished: function(outcome, result, reason) { ends = ends.concat([outcome]) }
+    }""")
+    wait(lambda: panel.property("ready"))
+    click(controls, "send")
+    wait(lambda: panel.property("outcome") == "succeeded")
+    assert panel.property("progress") == 1
+    assert controls.find("said").property("text") == "6 numbers"
+    assert controls.find("state").property("text") == "done"
+    assert not panel.property("active")
+
+
+def test_goal_is_canceled(controls: Any, counter: Any, wait: Any) -> None:
+    counter.offer()
+    panel = controls.show('ActionPanel { action: "/count"; goal: ({order: 50}) }')
+    wait(lambda: panel.property("ready"))
+    click(controls, "send")
+    wait(lambda: panel.property("outcome") == "running" and panel.property("feedback"))
+    click(controls, "cancel")
+    wait(lambda: panel.property("outcome") == "canceled")
+    assert controls.find("state").property("text") == "CANCELLED"
+
+
+def test_form_has_the_fields_of_the_goal(controls: Any, counter: Any, wait: Any) -> None:
+    counter.offer()
+    panel = controls.show('ActionPanel { action: "/count" }')
+    wait(lambda: panel.property("ready"))
+    wait(lambda: controls.find("field_order"))
+    write(controls, "field_order", "four")
+    assert controls.find("state").property("text") == "order is not a number"
+    assert not panel.property("active")
+    write(controls, "field_order", "2.5")
+    wait(lambda: "order: expected" in controls.find("state").property("text"))
+    write(controls, "field_order", "4")
+    wait(lambda: panel.property("outcome") == "succeeded")
+
+
+def test_rejected_goal_and_failed_goal_say_so(controls: Any, counter: Any, wait: Any) -> None:
+    counter.offer()
+    panel = controls.show('ActionPanel { action: "/count"; goal: ({order: -1}) }')
+    wait(lambda: panel.property("ready"))
+    panel.send(None)
+    wait(lambda: panel.property("outcome") == "refused")
+    assert controls.find("state").property("text") == "REFUSED"
+    panel.send({"order": 13})
+    wait(lambda: panel.property("outcome") == "aborted")
+    assert controls.find("state").property("text") == "FAILED"
+
+
+def test_lost_server_leaves_the_outcome_unknown(controls: Any, counter: Any, wait: Any) -> None:
+    counter.offer()
+    panel = controls.show('ActionPanel { action: "/count"; goal: ({order: 50}) }')
+    wait(lambda: panel.property("ready"))
+    panel.send(None)
+    wait(lambda: panel.property("outcome") == "running")
+    closing = threading.Thread(target=counter.server.close)
+    closing.start()
+    wait(lambda: panel.property("outcome") not in {"running", "sent"})
+    closing.join()
+    wait(lambda: not panel.property("ready"))
+    assert panel.property("outcome") in {"unknown", "aborted", "canceled"}
+    assert panel.property("status").startswith("NOT AVAILABLE")
+
+
+def test_action_of_an_unknown_type_is_named(controls: Any, wait: Any) -> None:
+    panel = controls.show('ActionPanel { action: "/count"; type: "nowhere/action/Nothing" }')
+    wait(lambda: "nowhere/action/Nothing" in panel.property("status"))
+
+
+def test_goal_over_a_real_middleware(live_controls: Any, url: str, wait: Any) -> None:
+    counter = Counter(live_controls.robot, url)
+    counter.offer()
+    panel = live_controls.show('ActionPanel { action: "/count" }')
+    wait(lambda: panel.property("ready"))
+    wait(lambda: panel.property("formType_"))
+    write(live_controls, "field_order", "5")
+    wait(lambda: panel.property("outcome") == "succeeded")
+    write(live_controls, "field_order", "13")
+    wait(lambda: panel.property("outcome") == "aborted")
+    write(live_controls, "field_order", "50")
+    wait(lambda: panel.property("outcome") == "running")
+    panel.cancel()
+    wait(lambda: panel.property("outcome") == "canceled")
