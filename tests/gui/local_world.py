@@ -45,9 +45,11 @@ class LocalWorld:
         name: str,
         namespace: str = "/",
         arguments: tuple[str, ...] = (),
+        *,
+        own_services: bool = False,
     ) -> LocalNode:
         """Return a new node that says it is connected to `url`; what it opens is shown."""
-        node = LocalNode(self, url or "memory://", name, namespace)
+        node = LocalNode(self, url or "memory://", name, namespace, own_services)
         self.show(node, self.nodes)
         return node
 
@@ -67,9 +69,11 @@ class LocalWorld:
 class LocalNode(Ros2Node):
     """A node whose connection breaks when a test says so."""
 
-    def __init__(self, world: LocalWorld, url: str, name: str, namespace: str) -> None:
+    def __init__(
+        self, world: LocalWorld, url: str, name: str, namespace: str, own_services: bool = False
+    ) -> None:
         self._world, self._end = world, _End(world, url)
-        super().__init__(self._end, url, name, namespace)
+        super().__init__(self._end, url, name, namespace, own_services=own_services)
 
     def set_status(self, state: ConnectionState, detail: str = "") -> None:
         """Change the state of the connection."""

@@ -7,6 +7,7 @@ from typing import Any
 
 from rosglass.controls.live_topic import LiveTopic
 from rosglass.controls.live_value import LiveValue
+from rosglass.controls.node_parameters import NodeParameters
 from rosglass.controls.twist_command import TwistCommand
 from rosglass.qt import QtCore, QtQml
 
@@ -17,6 +18,7 @@ TYPES: dict[str, type[QtCore.QObject]] = {
     "LiveTopic": LiveTopic,
     "TwistCommand": TwistCommand,
     "LiveValue": LiveValue,
+    "NodeParameters": NodeParameters,
 }
 
 

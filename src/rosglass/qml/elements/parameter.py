@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rosglass.qt import QtCore
 
 
-__all__ = ["Parameter", "ParameterLink", "Reading"]
+__all__ = ["Parameter", "ParameterLink", "Reading", "as_type"]
 
 _log = logging.getLogger("rosglass.qml")
 #: Seconds that a node has to answer.
@@ -42,6 +42,8 @@ _QUICK_READ_S, _READ_S = 1.0, 5.0
 _UNSETTLED_S = 10.0
 #: Seconds until a node that is not found is reported as missing.
 _DISCOVERY_S = 3.0
+#: Parameters of a node that are read at once at most.
+_MOST = 2000
 
 
 class Reading(NamedTuple):
@@ -69,6 +71,8 @@ class ParameterLink:
     def __init__(self, session: Session, node: Node, name: str) -> None:
         self._session, self._node, self._name = session, node, name
         self._listeners: dict[Any, tuple[str, Callable[[Reading], None]]] = {}
+        #: Listeners to all parameters.
+        self._watchers: dict[Any, Callable[[dict[str, Reading], bool], None]] = {}
         self._worker = Dispatcher(f"rosglass-qml parameters of {name}")
         self._client: ParameterClient | None = None
         self._watch: Handle | None = None
@@ -105,19 +109,47 @@ class ParameterLink:
             parameter: Name of the parameter.
             on_reading: Called on the GUI thread with every reading, changed or not.
         """
+        made = cls._shared(session, node, name)
+        made._listeners[listener] = (parameter, on_reading)
+        return made
+
+    @classmethod
+    def join_all(
+        cls,
+        session: Session,
+        node: Node,
+        name: str,
+        listener: Any,
+        on_readings: Callable[[dict[str, Reading], bool], None],
+    ) -> ParameterLink:
+        """Return the link to a node, after adding a listener to all its parameters.
+
+        Args:
+            session: The session.
+            node: Its node.
+            name: Full name of the other node.
+            listener: The key for :meth:`leave`.
+            on_readings: Called on the GUI thread with readings by name, and whether these are all.
+        """
+        made = cls._shared(session, node, name)
+        made._watchers[listener] = on_readings
+        return made
+
+    @classmethod
+    def _shared(cls, session: Session, node: Node, name: str) -> ParameterLink:
         key = (cls, node, name)
         link = session.shared.get(key)
         if link is None:
             link = session.shared[key] = cls(session, node, name)
         made: ParameterLink = link
-        made._listeners[listener] = (parameter, on_reading)
         made._read_at = 0.0
         return made
 
     def leave(self, listener: Any) -> None:
         """Stop calling a listener."""
         self._listeners.pop(listener, None)
-        if not self._listeners:
+        self._watchers.pop(listener, None)
+        if not self._listeners and not self._watchers:
             self.close()
 
     def close(self) -> None:
@@ -167,25 +199,22 @@ class ParameterLink:
 
         def work(client: ParameterClient) -> str:
             wanted = client.describe([name], timeout=_ANSWER_TIMEOUT_S)[name].type
-            result = client.set({name: _as(value, wanted)}, timeout=_ANSWER_TIMEOUT_S)[name]
+            result = client.set({name: as_type(value, wanted)}, timeout=_ANSWER_TIMEOUT_S)[name]
             return "" if result.successful else result.reason or "refused without a reason"
 
         self._ask(work, done)
 
     def _read(self) -> None:
-        names = sorted({name for name, _ in self._listeners.values()})
+        asked = {name for name, _ in self._listeners.values()}
+        whole = bool(self._watchers)
         self._reading, self._changed_since = True, {}
         now = time.monotonic()
         self._read_at = now + (_QUICK_READ_S if now < self._unsettled_until else _READ_S)
 
-        def work(client: ParameterClient, names: Sequence[str] = names) -> dict[str, Reading]:
-            try:
-                return self._readings(client, names)
-            except ParameterError as error:
-                if len(names) == 1:
-                    return {names[0]: Reading(None, None, str(error))}
-            # One invalid name must not prevent reading the others.
-            return {n: r for name in names for n, r in work(client, [name]).items()}
+        def work(client: ParameterClient) -> dict[str, Reading]:
+            declared = client.names(timeout=_ANSWER_TIMEOUT_S)[:_MOST] if whole else []
+            names = sorted(asked.union(declared))
+            return self._read_each(client, names) if names else {}
 
         def done(result: dict[str, Reading] | Error) -> None:
             self._reading = False
@@ -198,9 +227,18 @@ class ParameterLink:
                 if reading is not None and reading.value is not None and value is not None:
                     result[name] = reading._replace(value=value)
             self._known = result
-            self._notify(result)
+            self._notify(result, whole)
 
         self._ask(work, done)
+
+    def _read_each(self, client: ParameterClient, names: Sequence[str]) -> dict[str, Reading]:
+        try:
+            return self._readings(client, names)
+        except ParameterError as error:
+            if len(names) == 1:
+                return {names[0]: Reading(None, None, str(error))}
+        # One invalid name must not prevent reading the others.
+        return {n: r for name in names for n, r in self._read_each(client, [name]).items()}
 
     def _readings(self, client: ParameterClient, names: Sequence[str]) -> dict[str, Reading]:
         """Request values and descriptors; raises Error."""
@@ -268,18 +306,21 @@ class ParameterLink:
             reading = self._known.get(name)
             if name in event.changed and value is not None and reading and reading.descriptor:
                 known[name] = self._known[name] = reading._replace(value=value, problem="")
-            elif any(name == shown for shown, _ in self._listeners.values()):
+            elif self._watchers or any(name == shown for shown, _ in self._listeners.values()):
                 # Declared or undeclared: the descriptor has changed, too.
                 self.read_soon()
         self._notify(known)
 
-    def _notify(self, readings: dict[str, Reading]) -> None:
+    def _notify(self, readings: dict[str, Reading], whole: bool = False) -> None:
         for name, on_reading in list(self._listeners.values()):
             if name in readings:
                 on_reading(readings[name])
+        for on_readings in list(self._watchers.values()):
+            if readings or whole:
+                on_readings(readings, whole)
 
 
-def _as(value: Any, wanted: ParameterType) -> Any:
+def as_type(value: Any, wanted: ParameterType) -> Any:
     """Convert a JavaScript number, which has no integer type, to the parameter's type."""
     if wanted is ParameterType.DOUBLE and type(value) is int:
         return float(value)

@@ -1,0 +1,17 @@
+import QtQuick 2.15
+import QtQuick.Window 2.15
+import Ros2 1.0
+import RosControls 1.0
+
+Window {
+    width: 440; height: 260
+    visible: true
+    title: "ParameterForm"
+    color: Theme.background
+    Component.onCompleted: Ros2.init("parameter_form")
+
+    ParameterForm {
+        anchors { fill: parent; margins: Theme.gap }
+        node: "/robot"
+    }
+}
