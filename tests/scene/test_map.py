@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from inside import endpoint_of
 
-from rosglass.scene.displays.map import palette
+from rosglass.images.grid_colors import grid_colors
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -121,20 +121,20 @@ def test_an_update_changes_a_part(bench: SceneBench, show: Callable[..., Any]) -
 
 
 def test_palettes_have_the_colors_of_rviz() -> None:
-    colors = palette("map")
+    colors = grid_colors("map")
     assert colors[(0, 50, 100), :].tolist() == [[255] * 4, [128, 128, 128, 255], [0, 0, 0, 255]]
     assert colors[(110, 128, 254), :].tolist() == [
         [0, 255, 0, 255],
         [255, 0, 0, 255],
         [255, 255, 0, 255],
     ]
-    colors = palette("costmap")
+    colors = grid_colors("costmap")
     assert colors[(0, 50, 99), :].tolist() == [
         [0, 0, 0, 0],
         [127, 0, 128, 255],
         [0, 255, 255, 255],
     ]
-    assert palette("raw")[7].tolist() == [7, 7, 7, 255]
+    assert grid_colors("raw")[7].tolist() == [7, 7, 7, 255]
 
 
 def test_cells_are_squares(bench: SceneBench) -> None:

@@ -252,7 +252,8 @@ def test_messages_that_wait_for_their_transform_are_all_shown_later(
 
 
 def test_bytes_of_what_waits_are_bounded(bench: SceneBench, monkeypatch: Any) -> None:
-    from rosglass.scene.displays import message_queue, topic_display
+    from rosglass.qml.elements import message_queue
+    from rosglass.scene.displays import topic_display
 
     view = bench.load()
     display = view.scene.add("PointCloud2", topic="/cloud", decayTime=60.0, depth=100)
@@ -546,7 +547,7 @@ def test_nothing_is_late_while_the_robots_time_stands_still(bench: SceneBench) -
 
 def test_messages_wait_for_the_gui_thread_as_one_job() -> None:
     from rosglass.comm.handle import Executor
-    from rosglass.scene.displays.message_queue import MessageQueue
+    from rosglass.qml.elements.message_queue import MessageQueue
 
     class Waiting(Executor):
         jobs = 0

@@ -19,12 +19,12 @@ from rosglass.comm.names import similar
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import Error
 from rosglass.images.transports import camera_info_topic
+from rosglass.qml.elements.message_queue import MessageQueue, Subscriptions, drop_oldest
 from rosglass.qml.engine.properties import Writable
 from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import Property, QtCore, QtQml, Signal, Slot, is_alive
 from rosglass.scene.configs.settings import Setting
 from rosglass.scene.displays.image import PictureDisplay, fit_into, picture_bytes
-from rosglass.scene.displays.message_queue import MessageQueue, Subscriptions, drop_oldest
 from rosglass.scene.displays.parts import Parts
 from rosglass.scene.render.camera import PinholeCamera
 from rosglass.scene.view.scene_view import SceneView

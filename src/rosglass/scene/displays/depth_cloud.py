@@ -15,13 +15,13 @@ import numpy as np
 from rosglass.errors import Error
 from rosglass.images.compressed import decompress, decompress_depth
 from rosglass.images.transports import camera_info_topic
+from rosglass.qml.elements.message_queue import drop_oldest, frame_and_stamp
 from rosglass.scene.configs.settings import Setting
 from rosglass.scene.data.cloud_sources import (
     OcclusionBuffer,
     cloud_from_depth_image,
 )
 from rosglass.scene.data.point_clouds import Cloud
-from rosglass.scene.displays.message_queue import drop_oldest, frame_and_stamp
 from rosglass.scene.displays.point_cloud import (
     MAX_SIZE_M,
     METRIC_STYLES,

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from rosglass.errors import Error
 from rosglass.qml.elements.element import single_shot
+from rosglass.qml.elements.message_queue import MessageQueue, drop_oldest
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QtCore, QtQml, Signal, Slot, is_alive
@@ -34,7 +35,6 @@ from rosglass.scene.displays.interactive_marker_messages import (
     read_update,
 )
 from rosglass.scene.displays.marker_meshes import MarkerMeshes
-from rosglass.scene.displays.message_queue import MessageQueue, drop_oldest
 from rosglass.scene.displays.topic_display import TopicDisplay
 from rosglass.scene.render.scene_tree import Group
 

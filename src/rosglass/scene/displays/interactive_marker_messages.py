@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error
+from rosglass.qml.elements.message_queue import frame_and_stamp
 from rosglass.scene.displays.marker_messages import (
     ARROW,
     TEXT,
@@ -18,7 +19,6 @@ from rosglass.scene.displays.marker_messages import (
     MarkerRecord,
     read_marker,
 )
-from rosglass.scene.displays.message_queue import frame_and_stamp
 from rosglass.scene.render.arrays import check_numbers
 from rosglass.scene.render.matrices import instance_matrix, matrix_of
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from rosglass.comm.qos import QoS, Reliability
 from rosglass.errors import Error
+from rosglass.images.grid_colors import grid_colors
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.scene.configs.settings import Setting, rgb_of
 from rosglass.scene.displays.shapes import read_columns
@@ -26,40 +27,10 @@ if TYPE_CHECKING:
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
 
-__all__ = ["GridCellsDisplay", "MapDisplay", "palette"]
+__all__ = ["GridCellsDisplay", "MapDisplay"]
 
 _MAX_SIDE = 16384
 _MAX_CELLS = 2_000_000
-#: RViz's colour of cells that are unknown (-1).
-_UNKNOWN = (0x70, 0x89, 0x86, 255)
-
-
-def palette(scheme: str) -> NDArray[np.uint8]:
-    """Return RViz's colours of the 256 values of a cell, (256, 4) RGBA.
-
-    Values are those of ``nav_msgs/OccupancyGrid``: 0 free to 100 occupied, -1 (255) unknown; what
-    is not allowed is green (101 to 127) and red to yellow (-128 to -2).
-
-    Args:
-        scheme: ``map``, ``costmap`` or ``raw``.
-    """
-    value = np.arange(256)
-    out = np.full((256, 4), 255, np.uint8)
-    if scheme == "raw":
-        out[:, :3] = value[:, np.newaxis]
-        return out
-    share = value[:101] * 255 // 100
-    if scheme == "map":
-        out[:101, :3] = (255 - share)[:, np.newaxis]
-    else:
-        out[:101, 0], out[:101, 1], out[:101, 2] = share, 0, 255 - share
-        out[0] = 0
-        out[99], out[100] = (0, 255, 255, 255), (255, 0, 255, 255)
-    out[101:128] = (0, 255, 0, 255)
-    out[128:255, 0], out[128:255, 2] = 255, 0
-    out[128:255, 1] = 255 * (value[128:255] - 128) // (254 - 128)
-    out[255] = _UNKNOWN
-    return out
 
 
 class _Grid(NamedTuple):
@@ -250,7 +221,7 @@ class MapDisplay(TopicDisplay):
         self._place_again()
 
     def _restyle(self) -> None:
-        self._image.set_palette(palette(self.colorScheme))
+        self._image.set_palette(grid_colors(self.colorScheme))
         self._image.set_look(alpha=self.alpha, below=self.drawBehind)
 
     def reset(self) -> None:

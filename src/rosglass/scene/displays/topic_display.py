@@ -15,13 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import Error
-from rosglass.qml.engine.properties import ReadOnly, report
-from rosglass.qml.engine.session import weak_callback
-from rosglass.qt import is_alive
-from rosglass.scene.configs.rviz_formats import TopicSetting, read_topic
-from rosglass.scene.configs.settings import Setting
-from rosglass.scene.displays.display import LATE_S, OUTDATED_ALPHA, Display
-from rosglass.scene.displays.message_queue import (
+from rosglass.qml.elements.message_queue import (
     MAX_WAITING_BYTES,
     MOST_WAITING,
     MessageQueue,
@@ -30,6 +24,12 @@ from rosglass.scene.displays.message_queue import (
     drop_oldest,
     size_of,
 )
+from rosglass.qml.engine.properties import ReadOnly, report
+from rosglass.qml.engine.session import weak_callback
+from rosglass.qt import is_alive
+from rosglass.scene.configs.rviz_formats import TopicSetting, read_topic
+from rosglass.scene.configs.settings import Setting
+from rosglass.scene.displays.display import LATE_S, OUTDATED_ALPHA, Display
 from rosglass.scene.render.scene_tree import Group
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""The messages of a display on their way from the node's thread to the GUI thread."""
+"""The messages of a display or map on their way from a worker thread to the GUI thread."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ __all__ = [
     "size_of",
 ]
 
-_log = logging.getLogger("rosglass.scene")
+_log = logging.getLogger("rosglass.qml")
 _T = TypeVar("_T")
 
 #: Messages that wait for the GUI thread or their transforms, of displays that show each.
@@ -163,7 +163,7 @@ class MessageQueue:
                     raise Error("header.frame_id is empty: the publisher has to name the frame")
         except Error as reason:
             error = str(reason)
-        except Exception as reason:  # what peers send never ends the thread
+        except Exception as reason:  # noqa: BLE001 - what peers send never ends the thread
             _log.exception("a %s", what)
             error = f"this message could not be shown: {reason!r}"
         with self._lock:
@@ -194,13 +194,21 @@ class Subscriptions:
         node: The node.
         profiles: Requested QoS, by the absolute name of the topic.
         queue: Receives all messages.
+        worker: Decodes them; None for the node's own thread.
 
     Raises:
         Error: One of them could not be made.
     """
 
-    def __init__(self, node: Node, profiles: Mapping[str, QoS], queue: MessageQueue) -> None:
+    def __init__(
+        self,
+        node: Node,
+        profiles: Mapping[str, QoS],
+        queue: MessageQueue,
+        worker: Executor | None = None,
+    ) -> None:
         self._open: list[Any] = []
+        self._worker = worker
         try:
             for topic, qos in profiles.items():
                 self._open.append(self._subscribe(node, topic, qos, queue))
@@ -208,15 +216,18 @@ class Subscriptions:
             self.close()
             raise
 
-    @staticmethod
-    def _subscribe(node: Node, topic: str, qos: QoS, queue: MessageQueue) -> Any:
+    def _subscribe(self, node: Node, topic: str, qos: QoS, queue: MessageQueue) -> Any:
         made: list[Any] = []
 
         def on_sample(sample: Sample) -> None:
             # The first may arrive before the subscription is returned.
             queue.receive(sample, made[0].lateness(sample).seconds if made else 0.0)
 
-        made.append(node.create_subscription(topic, None, qos=qos, raw_callback=on_sample))
+        made.append(
+            node.create_subscription(
+                topic, None, qos=qos, raw_callback=on_sample, executor=self._worker
+            )
+        )
         return made[0]
 
     @property
