@@ -7,6 +7,9 @@ from typing import Any
 
 from rosglass.controls.live_topic import LiveTopic
 from rosglass.controls.live_value import LiveValue
+from rosglass.controls.map_camera import MapCamera
+from rosglass.controls.map_marks import MapArrow, MapMarks
+from rosglass.controls.map_scene import MapScene
 from rosglass.controls.node_parameters import NodeParameters
 from rosglass.controls.twist_command import TwistCommand
 from rosglass.qt import QtCore, QtQml
@@ -19,6 +22,10 @@ TYPES: dict[str, type[QtCore.QObject]] = {
     "TwistCommand": TwistCommand,
     "LiveValue": LiveValue,
     "NodeParameters": NodeParameters,
+    "MapArrow": MapArrow,
+    "MapCamera": MapCamera,
+    "MapMarks": MapMarks,
+    "MapScene": MapScene,
 }
 
 

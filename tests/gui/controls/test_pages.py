@@ -20,6 +20,8 @@ FILES = dict(
 )
 #: Parts of controls, of which the page of Theme has the names only.
 PARTS = {name for name in FILES if name.startswith("Theme") and name != "Theme"} | {"FocusRing"}
+#: Parts of one control, whose page names them.
+MAP_PARTS = {name for name in {*FILES, *TYPES} if name.startswith("Map") and name != "MapView"}
 EXAMPLES = sorted(ROOT.glob("examples/controls/*.qml"))
 _OWN = re.compile(
     r"^    (?:default |readonly )?(?:property (?:alias )?(?:[\w<>.]+ )?|signal |function )(\w+)",
@@ -42,7 +44,7 @@ def test_qmldir_lists_the_files() -> None:
 
 
 def test_every_control_has_a_page() -> None:
-    assert {*FILES, *TYPES} - PARTS - PAGES.keys() == set()
+    assert {*FILES, *TYPES} - PARTS - MAP_PARTS - PAGES.keys() == set()
 
 
 @pytest.mark.parametrize("name", sorted(PARTS))
@@ -50,7 +52,12 @@ def test_parts_are_named_on_the_page_of_the_theme(name: str) -> None:
     assert f"`{name}`" in PAGES["Theme"]
 
 
-@pytest.mark.parametrize("name", sorted({*FILES, *TYPES} - PARTS))
+@pytest.mark.parametrize("name", sorted(MAP_PARTS))
+def test_parts_are_named_on_the_page_of_the_map(name: str) -> None:
+    assert f"`{name}`" in PAGES["MapView"]
+
+
+@pytest.mark.parametrize("name", sorted({*FILES, *TYPES} - PARTS - MAP_PARTS))
 def test_page_describes_the_members(name: str) -> None:
     described = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`\n]+)`", PAGES[name]))))
     assert [one for one in members(name) if one not in described] == []

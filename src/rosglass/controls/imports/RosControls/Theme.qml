@@ -16,19 +16,22 @@ QtObject {
             background: "#070b10", panel: "#0e151d", edge: "#1d2935", text: "#e6eef5", dim: "#8fa3b5",
             faint: "#3a4a59", track: "#16202a", accent: "#3fd2e8", good: "#41d98a", warn: "#ffb63d",
             bad: "#ff5566", onAccent: "#04141a", shade: "#c0070b10",
-            sky: "#1f5583", ground: "#5a4026"
+            sky: "#1f5583", ground: "#5a4026",
+            mapUnknown: "#0a1016", mapFree: "#1b2631", mapOccupied: "#7e97ad"
         },
         bright: {
             background: "#eef1f4", panel: "#ffffff", edge: "#b7c0c9", text: "#0b1117", dim: "#4a5763",
             faint: "#9aa6b1", track: "#dde3e9", accent: "#00647a", good: "#0a6b38", warn: "#8a5200",
             bad: "#b3001b", onAccent: "#ffffff", shade: "#c0ffffff",
-            sky: "#8fc4ea", ground: "#d0ab7c"
+            sky: "#8fc4ea", ground: "#d0ab7c",
+            mapUnknown: "#ccd3da", mapFree: "#ffffff", mapOccupied: "#10161c"
         },
         contrast: {
             background: "#000000", panel: "#000000", edge: "#ffffff", text: "#ffffff", dim: "#ffffff",
             faint: "#a0a0a0", track: "#303030", accent: "#00ffff", good: "#00ff66", warn: "#ffd400",
             bad: "#ff8080", onAccent: "#000000", shade: "#e0000000",
-            sky: "#003c78", ground: "#5a3200"
+            sky: "#003c78", ground: "#5a3200",
+            mapUnknown: "#000000", mapFree: "#303030", mapOccupied: "#ffffff"
         }
     })
     readonly property var colors: palette_[mode] || palette_.dark
@@ -48,6 +51,10 @@ QtObject {
     readonly property color shade: colors.shade
     readonly property color sky: colors.sky
     readonly property color ground: colors.ground
+    // Unknown, free and occupied cells of a map.
+    readonly property color mapUnknown: colors.mapUnknown
+    readonly property color mapFree: colors.mapFree
+    readonly property color mapOccupied: colors.mapOccupied
 
     // Pixels.
     readonly property real size: scale >= 0.5 && scale <= 8 ? scale : 1

@@ -1,0 +1,207 @@
+// Sends goals, waypoints and the robot's pose to its navigation, and follows what becomes of them; a
+// part of MapView, which shows nothing by itself.
+import QtQuick 2.15
+import Ros2 1.0
+
+QtObject {
+    id: goals
+
+    // The map, whose fixed frame the poses are in.
+    property var scene: null
+    property string ns
+    // Names that override those that are found: of actions, or of the topics without a server.
+    property string goalAction
+    property string waypointsAction
+    property string goalTopic
+    property string poseTopic: "initialpose"
+
+    // "", "goal" or "waypoints": what the robot is driving to.
+    property string active: ""
+    // Whether the server has been asked to cancel.
+    property bool cancelling: false
+    // {x, y, yaw} in metres and radians: the goals that are driven to.
+    property var poses: []
+    // The number of waypoints that are behind the robot.
+    property int reached: 0
+    // Metres left to drive; NaN while unknown.
+    property real distance: NaN
+    // What became of the last goal, in words; whether that is bad.
+    property string text: ""
+    property bool bad: false
+
+    property var handle_: null
+    property var publishers_: ({})
+    property int number_: 0
+
+    function within_(name) {
+        return ns && name.charAt(0) !== "/" ? ns.replace(/\/+$/, "") + "/" + name : name
+    }
+    function pose_(pose) {
+        return { position: { x: pose.x, y: pose.y, z: 0 },
+                 orientation: { x: 0, y: 0, z: Math.sin(pose.yaw / 2), w: Math.cos(pose.yaw / 2) } }
+    }
+    function stamped_(pose) {
+        return { header: { frame_id: scene.fixedFrame }, pose: pose_(pose) }
+    }
+    function publisher_(topic, type, qos) {
+        const name = within_(topic)
+        if (!publishers_[name])
+            publishers_[name] = Ros2.createPublisher(name, type, qos)
+        return publishers_[name]
+    }
+    function refuse_(why) {
+        text = why.slice(0, 300)
+        bad = true
+        return false
+    }
+    function usable_(list) {
+        if (!scene || !scene.fixedFrame)
+            return refuse_(qsTr("not sent: the frame of the map is not known"))
+        for (const pose of list)
+            if (!isFinite(pose.x) || !isFinite(pose.y) || !isFinite(pose.yaw))
+                return refuse_(qsTr("not sent: %1, %2, %3 is not a pose").arg(pose.x).arg(pose.y).arg(pose.yaw))
+        return true
+    }
+
+    // Advertise what will be published, so that subscribers are connected by then.
+    function prepare(what) {
+        if (what === "pose")
+            publisher_(poseTopic, "geometry_msgs/msg/PoseWithCovarianceStamped")
+        else if (what === "goal" && !(goalAction || scene.goalAction))
+            publisher_(goalTopic || scene.goalTopic, "geometry_msgs/msg/PoseStamped", Ros2.CommandQoS())
+    }
+    // Drive to a pose.
+    function send(x, y, yaw) {
+        const pose = { x: x, y: y, yaw: yaw }
+        if (!usable_([pose]))
+            return false
+        const action = goalAction || scene.goalAction
+        if (!action)
+            return publishGoal_(pose)
+        const type = goalAction ? "" : scene.goalType
+        const isMoveBase = type ? type.indexOf("MoveBase") >= 0 : /move_base/.test(action)
+        return start_("goal", action, type, isMoveBase ? { target_pose: stamped_(pose) } : { pose: stamped_(pose) }, [pose])
+    }
+    // Drive to one pose after another.
+    function sendWaypoints(list) {
+        if (!list.length)
+            return refuse_(qsTr("not sent: there are no waypoints"))
+        if (!usable_(list))
+            return false
+        const action = waypointsAction || scene.waypointsAction
+        if (!action)
+            return refuse_(qsTr("not sent: no server of FollowWaypoints or NavigateThroughPoses"))
+        return start_("waypoints", action, waypointsAction ? "" : scene.waypointsType, { poses: list.map(stamped_) }, list)
+    }
+    // Set where the localization sees the robot.
+    function setPose(x, y, yaw) {
+        const pose = { x: x, y: y, yaw: yaw }
+        if (!usable_([pose]))
+            return false
+        // RViz's standard deviations: half a metre, and 15 degrees.
+        const covariance = new Array(36).fill(0)
+        covariance[0] = covariance[7] = 0.25
+        covariance[35] = 0.0685
+        const publisher = publisher_(poseTopic, "geometry_msgs/msg/PoseWithCovarianceStamped")
+        const sent = publisher.publish({ header: { frame_id: scene.fixedFrame },
+                                         pose: { pose: pose_(pose), covariance: covariance } })
+        text = sent ? qsTr("the pose was sent to %1").arg(publisher.topic) : qsTr("the pose was not sent: %1").arg(publisher.problem || qsTr("no connection"))
+        bad = !sent
+        return sent
+    }
+    function publishGoal_(pose) {
+        const publisher = publisher_(goalTopic || scene.goalTopic, "geometry_msgs/msg/PoseStamped", Ros2.CommandQoS())
+        const name = publisher.topic
+        if (scene.subscribers(name) === 0)
+            return refuse_(qsTr("not sent: there is no navigation action, and %1 has no subscriber").arg(name))
+        if (!publisher.publish(stamped_(pose)))
+            return refuse_(qsTr("not sent: %1").arg(publisher.problem || qsTr("no connection")))
+        poses = [pose]
+        text = qsTr("the goal was sent to %1, which reports nothing back").arg(name)
+        bad = false
+        return true
+    }
+    function start_(what, action, type, goal, list) {
+        const number = ++number_
+        const isCurrent = () => number === goals.number_
+        const client = Ros2.createActionClient(action, type)
+        text = qsTr("sending …")
+        bad = cancelling = false
+        distance = NaN
+        reached = 0
+        poses = list
+        active = what
+        try {
+            handle_ = client.sendGoalAsync(goal, {
+                onGoalResponse: function(handle) {
+                    if (isCurrent() && handle)
+                        goals.text = qsTr("accepted")
+                },
+                onFeedback: function(handle, feedback) {
+                    if (isCurrent())
+                        goals.follow_(feedback)
+                },
+                onResult: function(result) {
+                    if (isCurrent())
+                        goals.end_(result)
+                }
+            })
+            handle_.cancelFailed.connect(function(reason) {
+                if (isCurrent()) {
+                    goals.cancelling = false
+                    goals.refuse_(qsTr("not cancelled: %1").arg(reason))
+                }
+            })
+        } catch (error) {
+            active = ""
+            poses = []
+            return refuse_(qsTr("not sent: %1").arg(error.message))
+        }
+        return true
+    }
+    function follow_(feedback) {
+        if (!active)
+            return
+        if (feedback.distance_remaining !== undefined)
+            distance = feedback.distance_remaining
+        else if (feedback.base_position !== undefined && poses.length === 1)
+            distance = Math.hypot(feedback.base_position.pose.position.x - poses[0].x, feedback.base_position.pose.position.y - poses[0].y)
+        if (feedback.current_waypoint !== undefined)
+            reached = feedback.current_waypoint
+        else if (feedback.number_of_poses_remaining !== undefined)
+            reached = Math.max(0, poses.length - feedback.number_of_poses_remaining)
+        if (cancelling)
+            return
+        const parts = []
+        if (active === "waypoints")
+            parts.push(qsTr("waypoint %1 of %2").arg(Math.min(reached + 1, poses.length)).arg(poses.length))
+        parts.push(isFinite(distance) ? qsTr("%1 m left").arg(distance.toFixed(1)) : qsTr("driving"))
+        text = parts.join(", ")
+        bad = false
+    }
+    function end_(result) {
+        const missed = result.result && result.result.missed_waypoints ? result.result.missed_waypoints.length : 0
+        const reason = result.reason || (result.result && result.result.error_msg) || ""
+        text = result.code === 4 && missed ? qsTr("reached, without %1 of the waypoints").arg(missed)
+             : result.code === 4 ? qsTr("reached")
+             : result.code === 5 ? qsTr("cancelled")
+             : result.code === 6 ? (reason ? qsTr("not reached: %1").arg(reason) : qsTr("not reached"))
+             : qsTr("outcome unknown: %1").arg(reason)
+        text = text.slice(0, 300)
+        bad = result.code !== 4 && result.code !== 5 || missed > 0
+        active = ""
+        cancelling = false
+        handle_ = null
+        poses = []
+        distance = NaN
+    }
+    // Ask the server to end what it does.
+    function cancel() {
+        if (!active || !handle_)
+            return false
+        cancelling = true
+        text = qsTr("cancelling …")
+        handle_.cancel()
+        return true
+    }
+}

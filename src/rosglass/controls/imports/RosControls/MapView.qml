@@ -1,0 +1,436 @@
+// The map with costmaps, the robot, its track, scans, paths and particles; goals, waypoints and the
+// robot's pose are set by dragging.
+import QtQuick 2.15
+import RosControls 1.0
+
+LiveFrame {
+    id: view
+
+    // The map; without one, the first nav_msgs/OccupancyGrid without "costmap" in its name.
+    property string topic
+    property string ns
+    // Further topics; "*" for those that are found by their type, [] for none.
+    property var costmaps: ["*"]
+    property var scans: ["*"]
+    property var paths: ["*"]
+    property var footprints: ["*"]
+    property var particles: ["*"]
+    // The fixed frame; without one, that of the map. And the robot's.
+    property string frame
+    property string robotFrame: "base_link"
+    // Namespace of the topics tf and tf_static, where they are not global.
+    property string tfNs
+    // Colours of the map: "theme", "map" as in RViz, "costmap", "raw".
+    property string colors: "theme"
+    // Whether the robot stays in the middle, and is seen heading up.
+    property bool follow: false
+    property bool headingUp: false
+    property bool track: true
+    // Whether the buttons are shown; without them it is an image that can be moved.
+    property bool tools: true
+    // What a drag does: "" moves the map, "goal", "waypoints", "pose".
+    property string tool: ""
+    // Names of actions and topics, where they are not found: see MapGoals.
+    property alias goalAction: goals_.goalAction
+    property alias waypointsAction: goals_.waypointsAction
+    property alias goalTopic: goals_.goalTopic
+    property alias poseTopic: goals_.poseTopic
+
+    readonly property QtObject scene: scene_
+    readonly property QtObject camera: camera_
+    readonly property QtObject goals: goals_
+    // Metres driven since the track began.
+    readonly property real driven: scene_.driven
+    // {x, y, yaw} in metres and radians: waypoints that are not sent yet.
+    property var waypoints: []
+
+    // A click, in metres.
+    signal clicked(real x, real y)
+
+    // Show the whole map.
+    function fit() {
+        const box = scene_.bounds()
+        if (box.width > 0) {
+            follow = false
+            camera_.fit(box.x, box.y, box.x + box.width, box.y + box.height)
+            fitted_ = true
+        }
+    }
+    function zoomBy(factor) {
+        camera_.zoomBy(factor, plane.width / 2, plane.height / 2)
+    }
+    function sendWaypoints() {
+        if (goals_.sendWaypoints(waypoints))
+            waypoints = []
+    }
+
+    property bool fitted_: false
+    // The pose that is being dragged: null, or {x, y, yaw}.
+    property var draft_: null
+
+    function place_(x, y, yaw) {
+        const what = tool
+        if (what === "waypoints") {
+            waypoints = waypoints.concat([{ x: x, y: y, yaw: yaw }]).slice(0, 100)
+            return
+        }
+        tool = ""
+        if (what === "goal")
+            goals_.send(x, y, yaw)
+        else if (what === "pose")
+            goals_.setPose(x, y, yaw)
+    }
+    function lookAtRobot_() {
+        if (!scene_.robotSeen || !follow)
+            return
+        if (headingUp)
+            camera_.rotation = Math.PI / 2 - scene_.robotYaw
+        camera_.lookAt(scene_.robotX, scene_.robotY)
+    }
+    // The map was moved by hand.
+    function leave_() {
+        follow = false
+        fitted_ = true
+    }
+    function fitOnce_() {
+        if (fitted_ || follow || !(plane.width > 0 && plane.height > 0))
+            return
+        if (scene_.hasMap)
+            fit()
+        else if (scene_.robotSeen)
+            camera_.lookAt(scene_.robotX, scene_.robotY)
+    }
+
+    title: qsTr("Map")
+    stale: scene_.stale
+    age: scene_.age
+    problem: scene_.problem || scene_.status
+    note: scene_.robotSeen && track ? qsTr("%1 m driven").arg(scene_.driven.toFixed(1)) : ""
+    contentWidth: 320 * Theme.size
+    contentHeight: 240 * Theme.size
+    onFollowChanged: lookAtRobot_()
+    onHeadingUpChanged: lookAtRobot_()
+    onToolChanged: {
+        draft_ = null
+        if (tool)
+            goals_.prepare(tool)
+        else
+            waypoints = []
+    }
+
+    MapCamera {
+        id: camera_
+        width: plane.width
+        height: plane.height
+        onChanged: view.fitOnce_()
+    }
+    MapScene {
+        id: scene_
+        topic: view.topic
+        ns: view.ns
+        costmaps: view.costmaps
+        scans: view.scans
+        paths: view.paths
+        footprints: view.footprints
+        particles: view.particles
+        frame: view.frame
+        robotFrame: view.robotFrame
+        tfNs: view.tfNs
+        camera: camera_
+        colors: view.colors
+        freeColor: Theme.mapFree
+        occupiedColor: Theme.mapOccupied
+        onRobotMoved: view.lookAtRobot_()
+        onRepaint: view.fitOnce_()
+    }
+    MapGoals {
+        id: goals_
+        scene: scene_
+        ns: view.ns
+    }
+
+    Item {
+        id: plane
+        objectName: "plane"
+        anchors.fill: parent
+        clip: true
+        activeFocusOnTab: true
+        Accessible.role: Accessible.Graphic
+        Accessible.name: view.title
+        Accessible.description: view.status || view.note
+        Accessible.focusable: true
+
+        Keys.onPressed: function(event) {
+            const step = Math.max(20, Math.min(width, height) / 10)
+            const shift = event.modifiers & Qt.ShiftModifier
+            event.accepted = true
+            switch (event.key) {
+            case Qt.Key_Left: shift ? camera_.rotateBy(Math.PI / 36, width / 2, height / 2) : drag(step, 0); break
+            case Qt.Key_Right: shift ? camera_.rotateBy(-Math.PI / 36, width / 2, height / 2) : drag(-step, 0); break
+            case Qt.Key_Up: drag(0, step); break
+            case Qt.Key_Down: drag(0, -step); break
+            case Qt.Key_Plus: case Qt.Key_Equal: view.zoomBy(1.25); break
+            case Qt.Key_Minus: view.zoomBy(0.8); break
+            case Qt.Key_Home: view.fit(); break
+            case Qt.Key_0: camera_.rotation = 0; break
+            case Qt.Key_F: view.follow = !view.follow; break
+            case Qt.Key_Comma: turn(Math.PI / 12); break
+            case Qt.Key_Period: turn(-Math.PI / 12); break
+            case Qt.Key_Return: case Qt.Key_Enter: enter(event); break
+            case Qt.Key_Escape: giveUp(event); break
+            default: event.accepted = false
+            }
+        }
+        function drag(x, y) {
+            view.leave_()
+            camera_.panBy(x, y)
+            aim()
+        }
+        // With the keyboard, a goal is set in the middle of the view.
+        function aim() {
+            if (!view.tool || pointer.pressed)
+                return
+            view.draft_ = { x: camera_.centerX, y: camera_.centerY, yaw: view.draft_ ? view.draft_.yaw : 0 }
+        }
+        function turn(angle) {
+            aim()
+            if (view.draft_)
+                view.draft_ = { x: view.draft_.x, y: view.draft_.y, yaw: view.draft_.yaw + angle }
+        }
+        function enter(event) {
+            if (!view.tool)
+                event.accepted = false
+            else if (!view.draft_)
+                aim()
+            else
+                release()
+        }
+        function giveUp(event) {
+            if (view.draft_)
+                view.draft_ = null
+            else if (view.tool)
+                view.tool = ""
+            else
+                event.accepted = false
+        }
+        function release() {
+            const pose = view.draft_
+            view.draft_ = null
+            if (pose)
+                view.place_(pose.x, pose.y, pose.yaw)
+        }
+
+        Rectangle {
+            anchors.fill: parent
+            color: Theme.mapUnknown
+        }
+        Repeater {
+            model: scene_.layers
+            MapTiles {
+                source: modelData.tiles || null
+                opacity: !modelData.opacity ? 0 : modelData.stale ? modelData.opacity * 0.35 : modelData.opacity
+            }
+        }
+        MapMarks {
+            objectName: "marks"
+            anchors.fill: parent
+            scene: scene_
+            track: view.track
+            scanColor: Theme.bad
+            pathColor: Theme.good
+            footprintColor: Theme.warn
+            particleColor: Theme.accent
+            trackColor: Theme.accent
+        }
+        Repeater {
+            model: goals_.poses.concat(view.waypoints).concat(view.draft_ ? [view.draft_] : [])
+            MapMark {
+                camera: camera_
+                pose: modelData
+                label: goals_.poses.length + view.waypoints.length > 1 ? index + 1 : ""
+                color: index < goals_.poses.length ? (index < goals_.reached ? Theme.faint : Theme.good) : Theme.accent
+            }
+        }
+        MapMark {
+            objectName: "robot"
+            camera: camera_
+            visible: scene_.robotSeen
+            pose: ({ x: scene_.robotX, y: scene_.robotY, yaw: scene_.robotYaw })
+            color: scene_.robotKnown ? Theme.warn : Theme.bad
+        }
+
+        PinchHandler {
+            id: pinch
+            target: null
+            property real scale_: 1
+            property real angle_: 0
+            property point at_
+
+            function begin_() {
+                scale_ = activeScale
+                angle_ = activeRotation
+                at_ = centroid.position
+            }
+            onActiveChanged: {
+                view.draft_ = null
+                view.leave_()
+                begin_()
+            }
+            onUpdated: {
+                const at = centroid.position
+                camera_.panBy(at.x - at_.x, at.y - at_.y)
+                camera_.zoomBy(activeScale / scale_, at.x, at.y)
+                camera_.rotateBy((angle_ - activeRotation) * Math.PI / 180, at.x, at.y)
+                begin_()
+            }
+        }
+        MouseArea {
+            id: pointer
+            objectName: "pointer"
+            anchors.fill: parent
+            hoverEnabled: true
+            acceptedButtons: Qt.LeftButton | Qt.RightButton | Qt.MiddleButton
+            cursorShape: view.tool ? Qt.CrossCursor : pressed ? Qt.ClosedHandCursor : Qt.ArrowCursor
+            property real lastX: 0
+            property real lastY: 0
+            property bool moved: false
+            property bool turns: false
+
+            onPressed: function(mouse) {
+                plane.forceActiveFocus(Qt.MouseFocusReason)
+                lastX = mouse.x
+                lastY = mouse.y
+                moved = false
+                turns = mouse.button === Qt.RightButton || (mouse.modifiers & Qt.ShiftModifier)
+                if (view.tool && mouse.button === Qt.LeftButton) {
+                    const at = camera_.toMap(mouse.x, mouse.y)
+                    view.draft_ = { x: at.x, y: at.y, yaw: scene_.robotSeen ? Math.atan2(at.y - scene_.robotY, at.x - scene_.robotX) : 0 }
+                }
+            }
+            onPositionChanged: function(mouse) {
+                if (!pressed)
+                    return
+                if (Math.hypot(mouse.x - lastX, mouse.y - lastY) > 4)
+                    moved = true
+                if (view.draft_) {
+                    const at = camera_.toMap(mouse.x, mouse.y)
+                    if (moved)
+                        view.draft_ = { x: view.draft_.x, y: view.draft_.y, yaw: Math.atan2(at.y - view.draft_.y, at.x - view.draft_.x) }
+                    return
+                }
+                if (!moved)
+                    return
+                if (turns) {
+                    const before = Math.atan2(lastY - height / 2, lastX - width / 2)
+                    const now = Math.atan2(mouse.y - height / 2, mouse.x - width / 2)
+                    camera_.rotateBy(before - now, width / 2, height / 2)
+                } else {
+                    view.leave_()
+                    camera_.panBy(mouse.x - lastX, mouse.y - lastY)
+                }
+                lastX = mouse.x
+                lastY = mouse.y
+            }
+            onReleased: function(mouse) {
+                if (view.draft_)
+                    plane.release()
+                else if (!moved && !view.tool) {
+                    const at = camera_.toMap(mouse.x, mouse.y)
+                    view.clicked(at.x, at.y)
+                }
+            }
+            // Not released by the hand: nothing is sent.
+            onCanceled: view.draft_ = null
+            onWheel: function(wheel) {
+                const about = view.follow ? Qt.point(width / 2, height / 2) : Qt.point(wheel.x, wheel.y)
+                camera_.zoomBy(Math.pow(1.2, wheel.angleDelta.y / 120), about.x, about.y)
+            }
+        }
+        ThemeText {
+            anchors { left: parent.left; bottom: parent.bottom; margins: Theme.gap / 2 }
+            width: Math.min(implicitWidth, parent.width / 2)
+            visible: pointer.containsMouse
+            text: pointer.containsMouse && camera_.scale ? scene_.describe(camera_.toMap(pointer.mouseX, pointer.mouseY).x, camera_.toMap(pointer.mouseX, pointer.mouseY).y) : ""
+            color: Theme.dim
+            font.pixelSize: Theme.small
+        }
+        MapScale {
+            anchors { right: parent.right; bottom: parent.bottom; margins: Theme.gap / 2 }
+            pixelsPerMetre: camera_.scale
+            longest: Math.min(120 * Theme.size, parent.width / 3)
+        }
+    }
+    FocusRing { item: plane; visible: plane.activeFocus }
+
+    Flow {
+        id: bar
+        visible: view.tools
+        anchors { left: parent.left; right: parent.right; top: parent.top; margins: Theme.gap / 2 }
+        spacing: Theme.gap / 2
+
+        MapButton { objectName: "fit"; text: qsTr("Fit"); onClicked: view.fit() }
+        MapButton {
+            text: qsTr("Follow")
+            checkable: true
+            checked: view.follow
+            onClicked: view.follow = !view.follow
+        }
+        MapButton {
+            objectName: "goal"
+            text: qsTr("Goal")
+            checkable: true
+            checked: view.tool === "goal"
+            onClicked: view.tool = view.tool === "goal" ? "" : "goal"
+        }
+        MapButton {
+            objectName: "waypoints"
+            text: qsTr("Waypoints")
+            checkable: true
+            checked: view.tool === "waypoints"
+            onClicked: view.tool = view.tool === "waypoints" ? "" : "waypoints"
+        }
+        MapButton {
+            objectName: "sendWaypoints"
+            visible: view.waypoints.length > 0
+            text: qsTr("Drive %1").arg(view.waypoints.length)
+            tint: Theme.good
+            onClicked: view.sendWaypoints()
+        }
+        MapButton {
+            objectName: "pose"
+            text: qsTr("Pose")
+            checkable: true
+            checked: view.tool === "pose"
+            onClicked: view.tool = view.tool === "pose" ? "" : "pose"
+        }
+        MapButton {
+            objectName: "cancel"
+            visible: goals_.active !== ""
+            text: qsTr("Cancel goal")
+            tint: Theme.bad
+            enabled: !goals_.cancelling
+            onClicked: goals_.cancel()
+        }
+    }
+    Rectangle {
+        anchors { left: parent.left; top: bar.visible ? bar.bottom : parent.top; topMargin: Theme.gap / 2; leftMargin: Theme.gap / 2 }
+        visible: message.text !== ""
+        width: message.width + Theme.gap
+        height: message.height + Theme.gap / 2
+        radius: Theme.radius / 2
+        color: Theme.shade
+
+        ThemeText {
+            id: message
+            objectName: "message"
+            anchors.centerIn: parent
+            width: Math.min(implicitWidth, plane.width - 2 * Theme.gap)
+            text: view.tool === "goal" ? qsTr("press at the goal, drag to its heading")
+                : view.tool === "pose" ? qsTr("press where the robot is, drag to its heading")
+                : view.tool === "waypoints" ? qsTr("press and drag for each waypoint")
+                : goals_.text ? qsTr("Goal: %1").arg(goals_.text) : ""
+            color: !view.tool && goals_.bad ? Theme.bad : Theme.text
+            font.pixelSize: Theme.small
+        }
+    }
+}
