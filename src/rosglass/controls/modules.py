@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+from rosglass.controls.diagnostics import DiagnosticsTopic
 from rosglass.controls.live_topic import LiveTopic
 from rosglass.controls.live_value import LiveValue
 from rosglass.controls.map_camera import MapCamera
@@ -18,6 +19,7 @@ __all__ = ["TYPES", "register"]
 
 #: The types that are written in Python; ``imports/RosControls`` has those that are written in QML.
 TYPES: dict[str, type[QtCore.QObject]] = {
+    "DiagnosticsTopic": DiagnosticsTopic,
     "LiveTopic": LiveTopic,
     "TwistCommand": TwistCommand,
     "LiveValue": LiveValue,

@@ -84,6 +84,8 @@ class Subscription(TopicElement):
 
     #: The profile while QML sets none.
     _DEFAULT_QOS: ClassVar[QoS] = DEFAULT_QOS
+    #: Whether each message is shown, although they are taken at the throttle rate.
+    _TAKES_ALL: ClassVar[bool] = False
     _HOLDS = ("_sample", "_message", "_value", "_wake")
     _endpoint: TopicSubscription | None
     _timeout: int | None
@@ -279,7 +281,7 @@ class Subscription(TopicElement):
             self._wake()
         # They may have waited for their turn, or for a screen that stood still.
         held = time.monotonic() - endpoint.last_arrival if samples else 0.0
-        for sample in samples if self.throttleRate == 0 else samples[-1:]:
+        for sample in samples if self.throttleRate == 0 or self._TAKES_ALL else samples[-1:]:
             self._show(sample, held)
             # A handler may have changed the topic or destroyed this object.
             if not is_valid(self) or endpoint is not self._endpoint:
