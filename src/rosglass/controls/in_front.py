@@ -4,15 +4,23 @@ from __future__ import annotations
 
 from typing import Any
 
+from rosglass.qml.elements.image_sinks import window_of
 from rosglass.qt import QtCore, QtGui, QtQuick, address
 
 __all__ = ["find_item", "obstruction"]
 
 
-def find_item(thing: Any) -> QtQuick.QQuickItem | QtGui.QWindow | None:
-    """Return a QML object, or the next one around it, that is an item or a window."""
+def find_item(thing: Any, kept: list[Any]) -> QtQuick.QQuickItem | QtGui.QWindow | None:
+    """Return a QML object, or the next one around it, that is an item or a window.
+
+    Args:
+        thing: The object.
+        kept: Receives the objects around it, to be kept for as long as it is used: PySide 2 takes
+            an object for deleted when Python has no reference to its parent any more.
+    """
     while thing is not None and not isinstance(thing, (QtQuick.QQuickItem, QtGui.QWindow)):
         thing = thing.parent()
+        kept.append(thing)
     return thing
 
 
@@ -26,7 +34,7 @@ def obstruction(item: QtQuick.QQuickItem | QtGui.QWindow | None) -> str:
         return ""
     window: Any = item
     if isinstance(item, QtQuick.QQuickItem):
-        window = item.window()
+        window = window_of(item)
         if window is None or not item.isVisible() or _is_outside(item, window):
             return "the control is not visible"
         if not item.isEnabled():

@@ -13,6 +13,7 @@ from rosglass.controls.map_marks import MapArrow, MapMarks
 from rosglass.controls.map_scene import MapScene
 from rosglass.controls.node_parameters import NodeParameters
 from rosglass.controls.twist_command import TwistCommand
+from rosglass.controls.window_keys import WindowKeys
 from rosglass.qt import QtCore, QtQml
 
 __all__ = ["TYPES", "register"]
@@ -28,6 +29,7 @@ TYPES: dict[str, type[QtCore.QObject]] = {
     "MapCamera": MapCamera,
     "MapMarks": MapMarks,
     "MapScene": MapScene,
+    "WindowKeys": WindowKeys,
 }
 
 

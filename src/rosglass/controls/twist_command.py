@@ -14,6 +14,7 @@ from rosglass.controls.in_front import find_item, obstruction
 from rosglass.errors import Error, UnsupportedError
 from rosglass.interfaces.names import join_name
 from rosglass.qml.elements.element import Element
+from rosglass.qml.elements.image_sinks import window_of
 from rosglass.qml.engine.dialect import within_namespace
 from rosglass.qml.engine.log import plain_path
 from rosglass.qml.engine.properties import ReadOnly, Writable, report, within
@@ -63,6 +64,7 @@ class _Input:
         off: Why it does not steer until it was let go; empty while it steers.
         silent: Ticks since it steered last.
         shown: The item or window that must be in front.
+        kept: See :func:`find_item`.
         window: The window whose changes are observed.
     """
 
@@ -71,7 +73,8 @@ class _Input:
         self.item, self.name = item, item.objectName() or kind
         self.file, self.off = "", ""
         self.held, self.silent = False, 0
-        self.shown = find_item(item) or find_item(fallback)
+        self.kept: list[Any] = []
+        self.shown = find_item(item, self.kept) or find_item(fallback, self.kept)
         self.window: Any = None
 
 
@@ -226,7 +229,7 @@ class TwistCommand(Element):
         self._endpoint.begin(*map(_unit, wanted))
 
     def _watch_window(self, one: _Input) -> None:
-        window = one.shown.window() if isinstance(one.shown, QtQuick.QQuickItem) else one.shown
+        window = window_of(one.shown) if isinstance(one.shown, QtQuick.QQuickItem) else one.shown
         if window is not None and window is not one.window:
             one.window = window
             window.visibleChanged.connect(self._check)

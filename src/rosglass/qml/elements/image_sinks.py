@@ -29,7 +29,8 @@ def window_of(item: QtQuick.QQuickItem) -> QtQuick.QQuickWindow | None:
     for window in QtGui.QGuiApplication.allWindows():
         if isinstance(window, QtQuick.QQuickWindow):
             content = window.contentItem()
-            if content is item or content.isAncestorOf(item):
+            # None in a window that is being destroyed.
+            if content is not None and (content is item or content.isAncestorOf(item)):
                 return window
     return None
 

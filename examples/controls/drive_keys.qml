@@ -1,0 +1,19 @@
+import QtQuick 2.15
+import QtQuick.Window 2.15
+import Ros2 1.0
+import RosControls 1.0
+
+Window {
+    width: 320; height: 160
+    visible: true
+    title: "DriveKeys"
+    color: Theme.background
+    Component.onCompleted: Ros2.init("drive_keys")
+
+    TwistCommand { id: drive; topic: "/cmd_vel"; maxSpeed: 0.9; maxTurn: 1.2 }
+
+    DriveKeys {
+        anchors.centerIn: parent
+        command: drive
+    }
+}
