@@ -678,6 +678,21 @@ class TransformBuffer(Handle):
         """Return a snapshot of all frames, or of those of these names that exist."""
         return FrameTree(self._infos(None if frames is None else list(frames)))
 
+    def tree_faults(self) -> dict[str, str]:
+        """Return what is wrong with the place of frames in the tree, in words, by frame.
+
+        Two parents: transforms in both alternate, or two publishers have sent static ones. Cycles:
+        the transform that would close one is refused. A fault of transforms that are not static
+        ends ten seconds after the last of them.
+        """
+        with self._lock:
+            faults = self._store.faults()
+        # Without the lock: names of publishers are looked up in the graph.
+        return {
+            frame: "".join(str(part) or "an unknown node" for part in parts)
+            for frame, parts in faults.items()
+        }
+
     def silence(self, target: str, source: str) -> float:
         """Return for how long one frame may have been somewhere else in another one, in seconds.
 

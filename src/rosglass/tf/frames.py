@@ -11,10 +11,10 @@ import json
 import math
 import re
 from bisect import bisect_right
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass, field
 from time import monotonic
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rosglass.comm.statistics import fading_rate
 from rosglass.comm.time import Time
@@ -368,6 +368,12 @@ class DynamicCache:
 _MAX_RESTING = 2000
 #: How far the squared length of a quaternion may be from 1, as in tf2.
 _TOLERANCE = 10e-3
+#: Changes of a frame's parent within some seconds that are no move, but two publishers.
+_MIN_MOVES, _MOVES_S = 3, 10.0
+#: Frames whose changes of parent, and loops, are kept.
+_MAX_FAULTS = 1000
+#: Frames of a loop that a text names.
+_MAX_CHAIN = 8
 #: Seconds of old stamps only after which the time of a frame counts as jumped back.
 _JUMP_TIME_S = 3.0
 _PREFIX = {
@@ -395,6 +401,17 @@ _REASON = {
 }
 
 
+class _Move(NamedTuple):
+    """A transform with another parent than the one before; the time is monotonic, in seconds."""
+
+    time: float
+    before: str
+    authority_before: object
+    parent: str
+    authority: object
+    static: bool
+
+
 class _Behind(NamedTuple):
     """The start of a series of old transforms: monotonic time in seconds, and first stamp."""
 
@@ -420,6 +437,9 @@ class FrameStore:
             and now; for the buffer to log.
         jumps: Frames whose time jumped back, by how many nanoseconds, and their publishers; for the
             buffer to log.
+        moved_to: The last transforms of a frame that had another parent than the one before, each
+            with that parent and both publishers, by frame.
+        loops: The last transform of a frame that was refused because it closes a loop, by frame.
     """
 
     def __init__(self, keep: int) -> None:
@@ -431,6 +451,8 @@ class FrameStore:
         self.version = 0
         self.disagreements: list[tuple[str, object, object]] = []
         self.jumps: list[tuple[str, int, object]] = []
+        self.moved_to: dict[str, deque[_Move]] = {}
+        self.loops: dict[str, _Move] = {}
         self._behind: dict[str, _Behind] = {}
         #: Number of names by publisher, and when its outdated ones were last searched; those of
         #: all by None.
@@ -496,6 +518,8 @@ class FrameStore:
     def clear(self, static: bool) -> set[str]:
         """Remove dynamic frames, and static ones if `static`; return their names."""
         self._behind.clear()
+        self.moved_to.clear()
+        self.loops.clear()
         gone = {name for name, cache in self.caches.items() if static or not cache.static}
         for name in gone:
             self._remove(name)
@@ -547,8 +571,16 @@ class FrameStore:
         # A frame that is new has nothing below it.
         if child in self.names and (cache is None or cache.parent != parent):
             wrong = self._closes_loop(child, parent, None if static else stamp)
+            if wrong == "loop":
+                _keep(self.loops, child, _Move(monotonic(), "", None, parent, authority, static))
             if wrong:
                 return wrong
+        if cache is not None and cache.parent != parent:
+            before_it = self.authorities.get(child)
+            move = _Move(monotonic(), cache.parent, before_it, parent, authority, static)
+            if child not in self.moved_to:
+                _keep(self.moved_to, child, deque(maxlen=_MIN_MOVES))
+            self.moved_to[child].append(move)
         if cache is None or cache.static is not static:
             if cache is not None:
                 self.disagreements.append((child, self.authorities.get(child), authority))
@@ -559,8 +591,43 @@ class FrameStore:
             new = self._new_among((child, parent))
             self.names.update(dict.fromkeys(new, authority))
             self._counts[authority] += len(new)
+            self.loops.pop(child, None)
             self.version += before != (cache.parent, static)
         return kind
+
+    def faults(self) -> dict[str, tuple[object, ...]]:
+        """Return what is wrong with the place of frames in the tree, by frame.
+
+        Each is a text in parts; every second part is a publisher, whose name is looked up in the
+        graph, and so without the lock.
+        """
+        now = monotonic()
+        found: dict[str, tuple[object, ...]] = {}
+        for child, moves in self.moved_to.items():
+            last = moves[-1]
+            # Static transforms are sent once.
+            both = last.static and last.authority != last.authority_before
+            if both or (len(moves) == _MIN_MOVES and now - moves[0].time < _MOVES_S):
+                found[child] = (
+                    f"two parents: '{last.before}' from ",
+                    last.authority_before,
+                    f" and '{last.parent}' from ",
+                    last.authority,
+                )
+        for child, refused in self.loops.items():
+            if not refused.static and now - refused.time > _MOVES_S:
+                continue
+            chain = [child, refused.parent]
+            while (cache := self.caches.get(chain[-1])) and len(chain) < _MAX_CHAIN:
+                chain.append(cache.parent)
+                if chain[-1] == child:
+                    break
+            found[child] = (
+                f"a cycle: {' in '.join(chain)}; the transform in '{refused.parent}' from ",
+                refused.authority,
+                " is ignored",
+            )
+        return found
 
     def _new_among(self, names: Sequence[str]) -> list[str]:
         return [name for name in names if name not in self.names]
@@ -639,6 +706,14 @@ class FrameStore:
         self.authorities.pop(name, None)
         self.arrivals.pop(name, None)
         self.version += 1
+
+
+def _keep(kept: dict[str, Any], name: str, value: Any) -> None:
+    """Keep the value of a frame; the oldest makes room."""
+    kept.pop(name, None)
+    kept[name] = value
+    if len(kept) > _MAX_FAULTS:
+        del kept[next(iter(kept))]
 
 
 def _shortened(name: str) -> str:
