@@ -7,15 +7,21 @@ T.AbstractButton {
 
     property color tint: Theme.accent
 
+    function press_() {
+        if (checkable)
+            toggle()
+        clicked()
+    }
+
     implicitWidth: Math.max(Theme.touch, label.implicitWidth + 2 * Theme.gap)
     implicitHeight: Theme.touch
     focusPolicy: Qt.StrongFocus
     hoverEnabled: true
     Accessible.role: checkable ? Accessible.CheckBox : Accessible.Button
     Accessible.name: text
-    Accessible.onPressAction: click()
-    Keys.onReturnPressed: click()
-    Keys.onEnterPressed: click()
+    Accessible.onPressAction: press_()
+    Keys.onReturnPressed: press_()
+    Keys.onEnterPressed: press_()
 
     contentItem: ThemeText {
         id: label
