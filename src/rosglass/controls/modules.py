@@ -6,12 +6,16 @@ from functools import cache
 from typing import Any
 
 from rosglass.controls.diagnostics import DiagnosticsTopic
+from rosglass.controls.graph_layout import GraphLayout
 from rosglass.controls.live_topic import LiveTopic
 from rosglass.controls.live_value import LiveValue
 from rosglass.controls.map_camera import MapCamera
 from rosglass.controls.map_marks import MapArrow, MapMarks
 from rosglass.controls.map_scene import MapScene
+from rosglass.controls.message_rows import MessageRows
 from rosglass.controls.node_parameters import NodeParameters
+from rosglass.controls.tf_rows import TfRows
+from rosglass.controls.topic_rows import TopicRows
 from rosglass.controls.twist_command import TwistCommand
 from rosglass.controls.window_keys import WindowKeys
 from rosglass.qt import QtCore, QtQml
@@ -21,6 +25,7 @@ __all__ = ["TYPES", "register"]
 #: The types that are written in Python; ``imports/RosControls`` has those that are written in QML.
 TYPES: dict[str, type[QtCore.QObject]] = {
     "DiagnosticsTopic": DiagnosticsTopic,
+    "GraphLayout": GraphLayout,
     "LiveTopic": LiveTopic,
     "TwistCommand": TwistCommand,
     "LiveValue": LiveValue,
@@ -30,6 +35,9 @@ TYPES: dict[str, type[QtCore.QObject]] = {
     "MapMarks": MapMarks,
     "MapScene": MapScene,
     "WindowKeys": WindowKeys,
+    "MessageRows": MessageRows,
+    "TfRows": TfRows,
+    "TopicRows": TopicRows,
 }
 
 

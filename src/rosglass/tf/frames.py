@@ -368,7 +368,7 @@ class DynamicCache:
 _MAX_RESTING = 2000
 #: How far the squared length of a quaternion may be from 1, as in tf2.
 _TOLERANCE = 10e-3
-#: Changes of a frame's parent within some seconds that are no move, but two publishers.
+#: Changes of a frame's parent within some seconds that show two publishers, not a move.
 _MIN_MOVES, _MOVES_S = 3, 10.0
 #: Frames whose changes of parent, and loops, are kept.
 _MAX_FAULTS = 1000

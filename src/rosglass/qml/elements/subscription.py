@@ -86,7 +86,7 @@ class Subscription(TopicElement):
     _DEFAULT_QOS: ClassVar[QoS] = DEFAULT_QOS
     #: Whether each message is shown, although they are taken at the throttle rate.
     _TAKES_ALL: ClassVar[bool] = False
-    _HOLDS = ("_sample", "_message", "_value", "_wake")
+    _HOLDS: tuple[str, ...] = ("_sample", "_message", "_value", "_wake")
     _endpoint: TopicSubscription | None
     _timeout: int | None
     #: Has a sample that arrives announced on the GUI thread; from any thread.

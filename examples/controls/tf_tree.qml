@@ -1,0 +1,16 @@
+import QtQuick 2.15
+import QtQuick.Window 2.15
+import Ros2 1.0
+import RosControls 1.0
+
+Window {
+    width: 520; height: 300
+    visible: true
+    title: "TfTree"
+    color: Theme.background
+    Component.onCompleted: Ros2.init("tf_tree")
+
+    TfTree {
+        anchors { fill: parent; margins: Theme.gap }
+    }
+}

@@ -1,0 +1,287 @@
+"""The element ``GraphLayout``: nodes and topics of the robot, laid out as a graph."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rosglass.comm.names import hidden
+from rosglass.controls.layered_layout import Layout, lay_out
+from rosglass.controls.rows import Rows, copy_text, joined
+from rosglass.controls.topic_rows import read_topics
+from rosglass.qml.elements.element import Element, single_shot
+from rosglass.qml.engine.dialect import resolve_namespace
+from rosglass.qml.engine.properties import ReadOnly, Writable, report
+from rosglass.qml.engine.session import weak_callback
+from rosglass.qt import QtCore, Slot, is_alive
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rosglass.comm.node import Node
+    from rosglass.errors import Error
+
+__all__ = ["GraphLayout"]
+
+#: Milliseconds between two layouts.
+_PAUSE_MS = 500
+#: Nodes, topics and connections that are drawn at most; a filter finds the others.
+_MAX_VERTICES, _MAX_EDGES = 400, 2000
+#: Names that nearly every node is connected to.
+_HIDE = ["/rosout", "/rosout_agg", "/parameter_events", "/clock"]
+_SEGMENT_ROLES = ("key", "start", "stop", "x1", "y1", "x2", "y2", "leaves", "enters")
+_ROLES = ("key", "name", "isNode", "column", "line", "conflict", "detail")
+
+
+class _Wanted(NamedTuple):
+    """The choice of nodes and topics to draw.
+
+    Attributes:
+        filter: Text that names contain, in small letters; what is connected is drawn, too.
+        within: Namespace with a slash at its end, of nodes or topics; ``/`` for all.
+        hide: Names of nodes and topics that are left out.
+        with_hidden: Whether hidden names are included.
+        with_topics: Whether topics are drawn; otherwise nodes are connected directly.
+    """
+
+    filter: str
+    within: str
+    hide: frozenset[str]
+    with_hidden: bool
+    with_topics: bool
+
+
+class _Drawn(NamedTuple):
+    """Vertices and segments by key, the layout, and the number of vertices that are left out."""
+
+    vertices: dict[str, dict[str, Any]]
+    segments: dict[str, dict[str, Any]]
+    layout: Layout
+    omitted: int
+
+
+class GraphLayout(Element):
+    """The graph of nodes and topics. See its page in ``docs/controls``."""
+
+    #: Text that names of nodes or topics contain; what is connected to these is drawn, too.
+    filter = Writable(str, "", then="_look")
+    #: Namespace of nodes or topics; empty for all.
+    ns = Writable(str, "", then="_look")
+    #: Names of nodes and topics that are left out.
+    hide = Writable(list, _HIDE, lambda names: [str(name) for name in names], then="_look")
+    #: Whether hidden names are included, such as topics of actions.
+    hidden = Writable(bool, False, then="_look")
+    #: Whether topics are drawn; otherwise nodes are connected directly.
+    topics = Writable(bool, True, then="_look")
+    #: Nodes and topics, for a Repeater.
+    items = ReadOnly(QtCore.QObject, read=lambda self: self._model)
+    #: The parts of all connections, each between two columns, for a Repeater.
+    segments = ReadOnly(QtCore.QObject, read=lambda self: self._segments)
+    #: Number of columns and lines.
+    columns = ReadOnly(int, 0)
+    lines = ReadOnly(int, 0)
+    #: Number of nodes and topics that are drawn, and that are not, as there are too many.
+    count = ReadOnly(int, 0)
+    omitted = ReadOnly(int, 0)
+    #: Counts layouts, so that bindings on functions of the models are evaluated again.
+    version = ReadOnly(int, 0)
+    #: Whether the robot is not connected, so that this is the graph of before.
+    stale = ReadOnly(bool, True)
+
+    _HOLDS = ("_model", "_segments", "_drawn")
+
+    def __init__(self, parent: QtCore.QObject | None = None) -> None:
+        super().__init__(parent)
+        self._model = Rows(self, _ROLES)
+        self._segments = Rows(self, _SEGMENT_ROLES)
+        self._drawn = _Drawn({}, {}, lay_out((), ()), 0)
+        self._looking = self._look_again = False
+        self._pause = single_shot(self, self._look)
+
+    def _update(self) -> None:
+        super()._update()
+        self._look()
+        self._judge()
+
+    @Slot()
+    def _on_graph(self) -> None:
+        self._look()
+
+    @Slot()
+    def _on_connection(self) -> None:
+        self._look()
+        self._judge()
+
+    @Slot()
+    def _look(self) -> None:
+        """Read and lay out the graph on the worker thread, at most twice per second."""
+        node, session = self.node, self._session
+        if node is None or session is None:
+            return
+        if self._looking or self._pause.isActive():
+            self._look_again = True
+            return
+        self._looking, self._look_again = True, False
+        within = resolve_namespace(node, self.ns).rstrip("/") + "/" if self.ns else "/"
+        wanted = _Wanted(
+            self.filter.strip().lower(), within, frozenset(self.hide), self.hidden, self.topics
+        )
+        session.background(lambda: _draw(node, wanted), weak_callback(self._on_drawn))
+
+    def _on_drawn(self, result: _Drawn | Error) -> None:
+        if not is_alive(self):
+            return
+        self._looking = False
+        if isinstance(result, _Drawn) and self._disconnected() == "":
+            self._drawn = result
+            self._model.show(result.vertices)
+            self._segments.show(result.segments)
+            layout = result.layout
+            report(
+                self,
+                columns=max(layout.columns.values(), default=-1) + 1,
+                lines=int(max(layout.rows.values(), default=-1)) + 1,
+                count=len(result.vertices),
+                omitted=result.omitted,
+                version=self.version + 1,
+            )
+        self._judge()
+        if self._look_again:
+            self._pause.start(_PAUSE_MS)
+
+    def _get_problem(self) -> str:
+        # Not logged: the session does that.
+        return self._disconnected() if self._session is not None else ""
+
+    def _judge(self) -> None:
+        self._announce_problem()
+        report(self, stale=self._disconnected() != "")
+
+    @Slot(str, int, int, result=str)
+    def neighbour(self, key: str, right: int, down: int) -> str:
+        """Return the nearest node or topic in a direction; `key` itself if there is none.
+
+        Args:
+            key: Key of a node or topic; if it is not drawn, the first one is returned.
+            right: 1 for those at the right, -1 at the left, 0 for the same column.
+            down: 1 for those below, -1 above.
+        """
+        columns, rows = self._drawn.layout.columns, self._drawn.layout.rows
+        if key not in columns:
+            return min(columns, key=lambda one: (columns[one], rows[one]), default="")
+        column, row = columns[key], rows[key]
+        if right:
+            found = [one for one in columns if (columns[one] - column) * right > 0]
+            return min(
+                found,
+                key=lambda one: (abs(columns[one] - column), abs(rows[one] - row)),
+                default=key,
+            )
+        found = [one for one in columns if columns[one] == column and (rows[one] - row) * down > 0]
+        return min(found, key=lambda one: abs(rows[one] - row), default=key)
+
+    @Slot(str)
+    def copy(self, key: str) -> None:
+        """Copy the name of a node or topic."""
+        copy_text(_name(key))
+
+
+def _name(key: str) -> str:
+    return key.partition(" ")[2]
+
+
+def _draw(node: Node, wanted: _Wanted) -> _Drawn:
+    """Return the graph, laid out."""
+    topics = {
+        name: topic
+        for name, topic in read_topics(node).items()
+        if name not in wanted.hide and (wanted.with_hidden or not hidden(name))
+    }
+    nodes = {one.full for one in node.nodes()}
+    for topic in topics.values():
+        nodes.update(topic.publishers, topic.subscribers)
+    nodes = {
+        one for one in nodes if one not in wanted.hide and (wanted.with_hidden or not hidden(one))
+    }
+    edges = [
+        edge
+        for name, topic in topics.items()
+        for edge in (
+            *((f"node {one}", f"topic {name}") for one in topic.publishers if one in nodes),
+            *((f"topic {name}", f"node {one}") for one in topic.subscribers if one in nodes),
+        )
+    ]
+    keys = {f"node {one}" for one in nodes} | {f"topic {one}" for one in topics}
+    if wanted.filter or wanted.within != "/":
+        found = {
+            key
+            for key in keys
+            if wanted.filter in _name(key).lower() and _name(key).startswith(wanted.within)
+        }
+        keys = found | {other for a, b in edges for other in (a, b) if a in found or b in found}
+        edges = [(a, b) for a, b in edges if a in found or b in found]
+    if not wanted.with_topics:
+        keys = {key for key in keys if key.startswith("node ")}
+        edges = list(_joined_at_topics(edges))
+    drawn = sorted(keys)[:_MAX_VERTICES]
+    kept = set(drawn)
+    edges = [(a, b) for a, b in edges if a in kept and b in kept]
+    if len(edges) > _MAX_EDGES:
+        # Nothing could be seen in so many lines.
+        drawn, edges = [], []
+    layout = lay_out(drawn, edges)
+    published: dict[str, list[str]] = {}
+    subscribed: dict[str, list[str]] = {}
+    for name, topic in topics.items():
+        for ends, one in ((published, topic.publishers), (subscribed, topic.subscribers)):
+            for end in dict.fromkeys(one):
+                ends.setdefault(end, []).append(name)
+    vertices = {}
+    for key in drawn:
+        name = _name(key)
+        found_topic = topics.get(name) if key.startswith("topic ") else None
+        detail = (
+            f"publishes {joined(published.get(name, ())) or 'nothing'}; subscribes to "
+            f"{joined(subscribed.get(name, ())) or 'nothing'}"
+            if found_topic is None
+            else f"{joined(found_topic.types)}: from "
+            f"{joined(found_topic.publishers) or 'no publisher'} to "
+            f"{joined(found_topic.subscribers) or 'no subscriber'}"
+        )
+        vertices[key] = {
+            "name": name, "isNode": found_topic is None, "column": layout.columns[key],
+            "line": layout.rows[key], "detail": detail,
+            "conflict": "" if found_topic is None else found_topic.conflict,
+        }  # fmt: skip
+    return _Drawn(vertices, _segments_of(layout), layout, len(keys) - len(drawn))
+
+
+def _segments_of(layout: Layout) -> dict[str, dict[str, Any]]:
+    """Return the parts of all connections; -1 or 1 is the side where they leave or enter a box."""
+    found: dict[str, dict[str, Any]] = {}
+    for (start, stop), route in layout.routes.items():
+        side = 1 if route[-1][0] > route[0][0] else -1
+        for at, ((x1, y1), (x2, y2)) in enumerate(itertools.pairwise(route)):
+            found[f"{start}\n{stop}\n{at}"] = {
+                "start": start, "stop": stop, "x1": x1, "y1": y1, "x2": x2, "y2": y2,
+                "leaves": side if at == 0 else 0, "enters": -side if at == len(route) - 2 else 0,
+            }  # fmt: skip
+    return found
+
+
+def _joined_at_topics(edges: Iterable[tuple[str, str]]) -> set[tuple[str, str]]:
+    """Return the connections between nodes that lead through a topic."""
+    sources: dict[str, list[str]] = {}
+    sinks: dict[str, list[str]] = {}
+    for a, b in edges:
+        if b.startswith("topic "):
+            sources.setdefault(b, []).append(a)
+        else:
+            sinks.setdefault(a, []).append(b)
+    found: set[tuple[str, str]] = set()
+    for topic, ends in sources.items():
+        for a in ends:
+            found.update((a, b) for b in sinks.get(topic, ()) if a != b)
+            if len(found) > _MAX_EDGES:
+                return found
+    return found

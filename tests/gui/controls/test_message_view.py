@@ -1,0 +1,153 @@
+"""The control MessageView."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from control_trees import clipboard, drag, press, rows
+
+SCAN, POSE = "sensor_msgs/msg/LaserScan", "geometry_msgs/msg/PoseStamped"
+pytestmark = pytest.mark.both_qt
+
+
+def show(controls: Any, wait: Any, topic: str, kind: str, **fields: Any) -> tuple[Any, Any]:
+    """Show a message; return the view and the publisher."""
+    publisher = controls.robot.create_publisher(topic, kind)
+    view = controls.show(f'MessageView {{ topic: "{topic}"; editable: true }}')
+    wait(publisher.subscription_count)
+    publisher.publish(**fields)
+    wait(lambda: rows(controls, "key"))
+    return view, publisher
+
+
+def unfold(controls: Any, *keys: str) -> None:
+    for key in keys:
+        controls.find("tree").toggled.emit(key)
+
+
+def push(controls: Any, button: str) -> None:
+    """Push a button by the keyboard."""
+    controls.find(button).forceActiveFocus()
+    press(controls, "Return")
+
+
+def test_fields_with_values_units_and_paths(controls: Any, wait: Any) -> None:
+    view, publisher = show(controls, wait, "/scan", SCAN, range_max=30.5, ranges=[0.1, 2, math.nan])
+    found = {row[0]: row[1:] for row in rows(controls, "key", "value", "unit", "path", "type")}
+    assert found["range_max"] == ("30.5", "m", "/scan:range_max", "float32")
+    assert found["ranges"] == ("0.1, 2, nan", "m", "/scan:ranges[*]", "float32[]")
+    assert found["header"][1:] == ("", "", "std_msgs/msg/Header")
+    unfold(controls, "ranges", "header")
+    found = dict(rows(controls, "key", "value"))
+    assert found["ranges[1]"] == "2"
+    assert found["header.stamp"] == "0.000000000 s"
+    publisher.publish(range_max=12, ranges=[7])
+    wait(lambda: "ranges[1]" not in dict(rows(controls, "key", "value")))
+    assert dict(rows(controls, "key", "value"))["ranges[0]"] == "7"
+    assert view.property("type") == SCAN
+
+
+def test_long_arrays_are_counted_and_every_element_is_reached(controls: Any, wait: Any) -> None:
+    show(controls, wait, "/scan", SCAN, ranges=[float(number) for number in range(25_000)])
+    assert dict(rows(controls, "key", "value"))["ranges"] == "0, 1, 2, 3 and 24,996 more"
+    unfold(controls, "ranges")
+    assert [key for key in rows(controls, "key") if key.startswith("ranges[")] == [
+        "ranges[0:10000]", "ranges[10000:20000]", "ranges[20000:25000]",
+    ]  # fmt: skip
+    unfold(controls, "ranges[20000:25000]", "ranges[24900:25000]")
+    assert dict(rows(controls, "key", "value"))["ranges[24999]"] == "24999"
+    assert len(rows(controls, "key")) < 200
+
+
+def test_hostile_texts_stay_in_one_line(controls: Any, wait: Any) -> None:
+    show(controls, wait, "/text", "std_msgs/msg/String", data="<b>a</b>\n\x1b" + "x" * 100_000)
+    value = rows(controls, "value")[0]
+    assert value.startswith("<b>a</b>\\n\\x1b")
+    assert value.endswith("and 99,710 more characters")
+
+
+def test_the_path_of_a_field_is_copied(controls: Any, wait: Any) -> None:
+    view, _ = show(controls, wait, "/pose", POSE)
+    unfold(controls, "pose", "pose.position")
+    controls.find("rows").forceActiveFocus()
+    press(controls, "Down", 3)
+    assert view.property("path") == "/pose:pose.position.x"
+    press(controls, "C", control=True)
+    assert clipboard() == "/pose:pose.position.x"
+    press(controls, "Left")
+    assert view.property("path") == ""
+
+
+def test_a_number_is_dragged_onto_a_plot(controls: Any, wait: Any) -> None:
+    publisher = controls.robot.create_publisher("/x", "std_msgs/msg/Float64")
+    controls.show(
+        """Item { anchors.fill: parent
+            property string dropped
+            MessageView { topic: "/x"; width: parent.width; height: 150 }
+            DropArea {
+                objectName: "plot"; y: 160; width: parent.width; height: 100
+                keys: ["rosglass/path"]
+                onDropped: function(drop) { parent.dropped = drop.source.path }
+            }
+        }"""
+    )
+    wait(publisher.subscription_count)
+    publisher.publish(data=1.5)
+    wait(lambda: rows(controls, "key") == ["data"])
+    wait.signals(controls.window.frameSwapped)
+    drag(controls, controls.find("hand"), controls.find("plot"))
+    wait(lambda: controls.window.property("control").property("dropped") == "/x:data")
+    # Back in its row.
+    wait(lambda: controls.find("dragged", controls.find("tree")).x() == 0)
+
+
+def test_an_edited_message_is_published(controls: Any, wait: Any) -> None:
+    view, _ = show(controls, wait, "/pose", POSE, pose={"position": {"x": 1.0}})
+    received: list[Any] = []
+    controls.robot.create_subscription("/pose", POSE, received.append)
+    push(controls, "edit")
+    assert view.property("editing")
+    unfold(controls, "pose", "pose.position")
+    controls.find("rows").forceActiveFocus()
+    press(controls, "Down", 3)
+    press(controls, "Return")
+    field = controls.find("value")
+    assert field.property("text") == "1.0"
+    field.setProperty("text", "fast")
+    press(controls, "Return")
+    assert "expected a number" in controls.find("refusal").property("text")
+    field.setProperty("text", "-2.5")
+    press(controls, "Return")
+    assert dict(rows(controls, "key", "value"))["pose.position.x"] == "-2.5"
+    push(controls, "publish")
+    wait(lambda: any(one.pose.position.x == -2.5 for one in received))
+    push(controls, "publish")
+    wait(lambda: controls.find("refusal").property("text").startswith("Sent to "))
+    push(controls, "cancel")
+    assert not view.property("editing")
+
+
+def test_received_messages_do_not_disturb_editing(controls: Any, wait: Any) -> None:
+    view, publisher = show(controls, wait, "/pose", POSE, pose={"position": {"x": 1.0}})
+    push(controls, "edit")
+    unfold(controls, "pose", "pose.position")
+    for _ in range(5):
+        publisher.publish(pose={"position": {"x": 9.0}})
+    wait.settled(controls._bench.session)
+    assert dict(rows(controls, "key", "value"))["pose.position.x"] == "1.0"
+    view.setProperty("topic", "/other")
+    wait(lambda: not view.property("editing"))
+    assert rows(controls, "key") == []
+
+
+def test_nothing_can_be_edited_by_default(controls: Any, wait: Any) -> None:
+    controls.show('MessageView { topic: "/pose" }')
+    assert not controls.find("edit").isVisible()
+
+
+def test_without_a_topic_nothing_is_wrong(controls: Any) -> None:
+    view = controls.show("MessageView {}")
+    assert view.property("status") == ""
+    assert controls.find("heading").property("text") == "No topic is selected."
