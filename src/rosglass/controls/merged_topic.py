@@ -31,7 +31,7 @@ class MergedTopic(LiveTopic):
 
     _TAKES_ALL = True
     _DEFAULT_QOS = QoS(depth=100, reliability=Reliability.BEST_AVAILABLE)
-    _HOLDS: ClassVar[tuple[str, ...]] = (*LiveTopic._HOLDS, "_rows", "_model")
+    _HOLDS = (*LiveTopic._HOLDS, "_rows", "_model")
     #: Names of the roles.
     ROLES: ClassVar[tuple[str, ...]] = ()
 

@@ -9,6 +9,7 @@ from rosglass.controls.diagnostics import DiagnosticsTopic
 from rosglass.controls.graph_layout import GraphLayout
 from rosglass.controls.live_topic import LiveTopic
 from rosglass.controls.live_value import LiveValue
+from rosglass.controls.log_topic import LogTopic
 from rosglass.controls.map_camera import MapCamera
 from rosglass.controls.map_marks import MapArrow, MapMarks
 from rosglass.controls.map_scene import MapScene
@@ -29,6 +30,7 @@ TYPES: dict[str, type[QtCore.QObject]] = {
     "LiveTopic": LiveTopic,
     "TwistCommand": TwistCommand,
     "LiveValue": LiveValue,
+    "LogTopic": LogTopic,
     "NodeParameters": NodeParameters,
     "MapArrow": MapArrow,
     "MapCamera": MapCamera,

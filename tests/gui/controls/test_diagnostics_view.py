@@ -6,32 +6,15 @@ import random
 from typing import Any
 
 import pytest
+from rows import DIAGNOSTICS, HOSTILE, part, rows_of
 
 pytestmark = pytest.mark.both_qt
-TYPE = "diagnostic_msgs/msg/DiagnosticArray"
-HOSTILE = "<b>bold</b>\x1b[31m\u202e\n" + "x" * 1_000_000
-
-
-def part(name: str, level: int = 0, message: str = "", hardware: str = "", **values: str) -> Any:
-    pairs = [{"key": key, "value": value} for key, value in values.items()]
-    return {
-        "name": name, "level": level, "message": message, "hardware_id": hardware, "values": pairs
-    }  # fmt: skip
-
-
-def rows_of(model: Any) -> list[dict[str, Any]]:
-    """Return all rows of a model, by the names of the roles."""
-    roles = {role: bytes(name.data()).decode() for role, name in model.roleNames().items()}
-    return [
-        {name: model.data(model.index(at, 0), role) for role, name in roles.items()}
-        for at in range(model.rowCount())
-    ]
 
 
 @pytest.fixture
 def shown(controls: Any, wait: Any) -> Any:
     def show(control: str = "DiagnosticsView {}") -> Any:
-        publisher = controls.robot.create_publisher("/diagnostics", TYPE)
+        publisher = controls.robot.create_publisher("/diagnostics", DIAGNOSTICS)
         view = controls.show(control)
         wait(publisher.subscription_count)
         return view, publisher, lambda: rows_of(view.property("reports").property("model"))
@@ -52,7 +35,7 @@ def test_worst_parts_are_first(shown: Any, wait: Any) -> None:
 
 def test_reports_of_all_publishers_are_merged(shown: Any, controls: Any, wait: Any) -> None:
     view, publisher, rows = shown()
-    other = controls.robot.create_publisher("/diagnostics", TYPE)
+    other = controls.robot.create_publisher("/diagnostics", DIAGNOSTICS)
     wait(other.subscription_count)
     for at in range(20):
         publisher.publish(status=[part(f"drive {at}", 0, "spins")])
