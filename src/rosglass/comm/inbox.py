@@ -363,6 +363,14 @@ class Inbox:
         with self._lock:
             return self._pop() if self._samples else None
 
+    def pop_all(self) -> list[Sample]:
+        """Remove and return all samples, the oldest first."""
+        with self._lock:
+            samples = list(self._samples)
+            self._samples.clear()
+            self._held_bytes = 0
+            return samples
+
     def pop_latest(self) -> Sample | None:
         """Remove and return the newest sample, and drop the others."""
         with self._lock:

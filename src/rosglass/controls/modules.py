@@ -15,6 +15,8 @@ from rosglass.controls.map_marks import MapArrow, MapMarks
 from rosglass.controls.map_scene import MapScene
 from rosglass.controls.message_rows import MessageRows
 from rosglass.controls.node_parameters import NodeParameters
+from rosglass.controls.plot import PlotData, PlotSeries
+from rosglass.controls.plot_lines import PlotLines
 from rosglass.controls.tf_rows import TfRows
 from rosglass.controls.topic_rows import TopicRows
 from rosglass.controls.twist_command import TwistCommand
@@ -40,6 +42,9 @@ TYPES: dict[str, type[QtCore.QObject]] = {
     "MessageRows": MessageRows,
     "TfRows": TfRows,
     "TopicRows": TopicRows,
+    "PlotData": PlotData,
+    "PlotLines": PlotLines,
+    "PlotSeries": PlotSeries,
 }
 
 

@@ -17,21 +17,24 @@ QtObject {
             faint: "#3a4a59", track: "#16202a", accent: "#3fd2e8", good: "#41d98a", warn: "#ffb63d",
             bad: "#ff5566", onAccent: "#04141a", shade: "#c0070b10",
             sky: "#1f5583", ground: "#5a4026",
-            mapUnknown: "#0a1016", mapFree: "#1b2631", mapOccupied: "#7e97ad"
+            mapUnknown: "#0a1016", mapFree: "#1b2631", mapOccupied: "#7e97ad",
+            series: ["#3fd2e8", "#ffb63d", "#9d8cff", "#41d98a", "#ff7ab8", "#d6e04a", "#6ea8ff", "#ff8a5c", "#b8c4cf", "#38c7a5"]
         },
         bright: {
             background: "#eef1f4", panel: "#ffffff", edge: "#b7c0c9", text: "#0b1117", dim: "#4a5763",
             faint: "#9aa6b1", track: "#dde3e9", accent: "#00647a", good: "#0a6b38", warn: "#8a5200",
             bad: "#b3001b", onAccent: "#ffffff", shade: "#c0ffffff",
             sky: "#8fc4ea", ground: "#d0ab7c",
-            mapUnknown: "#ccd3da", mapFree: "#ffffff", mapOccupied: "#10161c"
+            mapUnknown: "#ccd3da", mapFree: "#ffffff", mapOccupied: "#10161c",
+            series: ["#00647a", "#b35900", "#5b3fc4", "#0a6b38", "#b0186a", "#6b6b00", "#0b4fc2", "#a1320a", "#4a5763", "#00695c"]
         },
         contrast: {
             background: "#000000", panel: "#000000", edge: "#ffffff", text: "#ffffff", dim: "#ffffff",
             faint: "#a0a0a0", track: "#303030", accent: "#00ffff", good: "#00ff66", warn: "#ffd400",
             bad: "#ff8080", onAccent: "#000000", shade: "#e0000000",
             sky: "#003c78", ground: "#5a3200",
-            mapUnknown: "#000000", mapFree: "#303030", mapOccupied: "#ffffff"
+            mapUnknown: "#000000", mapFree: "#303030", mapOccupied: "#ffffff",
+            series: ["#00ffff", "#ffd400", "#ff66ff", "#00ff66", "#ff9933", "#ffffff", "#66b3ff", "#ff8080", "#ccff33", "#c0a0ff"]
         }
     })
     readonly property var colors: palette_[mode] || palette_.dark
@@ -55,6 +58,8 @@ QtObject {
     readonly property color mapUnknown: colors.mapUnknown
     readonly property color mapFree: colors.mapFree
     readonly property color mapOccupied: colors.mapOccupied
+    // Of the series of a plot, one after another.
+    readonly property var series: colors.series
 
     // Pixels.
     readonly property real size: scale >= 0.5 && scale <= 8 ? scale : 1
