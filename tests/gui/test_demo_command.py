@@ -232,10 +232,10 @@ def test_a_copy_of_the_cockpit_runs(tmp_path: Path, url: str) -> None:
 
     from rosglass.demo.processes import VirtualScreen
 
-    copied = start(tmp_path, "examples", "mine")
+    copied = start(tmp_path, "examples", "--all", "mine")
     output = copied.communicate(timeout=60)[0]
     assert copied.returncode == 0, output
-    again = start(tmp_path, "examples", "mine")
+    again = start(tmp_path, "examples", "--all", "mine")
     assert "mine exists already: name a new folder" in again.communicate(timeout=60)[0]
     assert again.returncode == 1
     shown = re.search(r"rosglass (run mine/cockpit/main\.qml) --watch", output)

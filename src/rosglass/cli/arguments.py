@@ -935,12 +935,18 @@ def _router(parser: argparse.ArgumentParser) -> None:
 
 
 def _examples(parser: argparse.ArgumentParser) -> None:
+    _add_name(
+        parser,
+        "names",
+        "examples",
+        nargs="*",
+        metavar="NAME",
+        help="an example to copy to this folder, with what it needs; without, all are listed",
+    )
     parser.add_argument(
-        "folder",
-        nargs="?",
-        default="examples",
+        "--all",
         metavar="FOLDER",
-        help="a new folder for the copies (default: examples)",
+        help="copy all examples, and the demo's cockpit, into a new folder",
     )
 
 
@@ -973,6 +979,6 @@ COMMANDS = {
     "bridge": (_bridge, "relay topics, services and actions between two graphs"),
     "doctor": (_doctor, "find what blocks the connection to the robot"),
     "router": (_router, "run a Zenoh router for ROS 2 (rmw_zenoh)"),
-    "examples": (_examples, "copy the examples and the demo's cockpit to a new folder"),
+    "examples": (_examples, "list the examples, or copy one to start from"),
     "completion": (_completion, "print the shell code for Tab completion"),
 }

@@ -71,6 +71,10 @@ def complete_names(
 
 def _names(what: str, args: argparse.Namespace) -> list[str]:
     # Options are completed without these.
+    if what == "examples":
+        from rosglass.cli import examples  # noqa: PLC0415
+
+        return examples.names()
     from rosglass.cli.connecting import names_ros1, other_nodes, wait  # noqa: PLC0415
     from rosglass.cli.interface import type_names  # noqa: PLC0415
     from rosglass.cli.network import nearby_url  # noqa: PLC0415 - not for every command

@@ -41,7 +41,7 @@ EXAMPLES = {
     "bridge": ("ros1://robot:11311 zenoh://127.0.0.1:7447 -t '/camera/*->' -t '/cmd_vel<-'",),
     "demo": ("", "--no-robot --url zenoh://robot.local:7447"),
     "doctor": ("--url zenoh://robot.local:7447", "--scan"),
-    "examples": ("mine",),
+    "examples": ("", "remote_control", "--all mine"),
     "interface list": ("Pose --kind msg",),
     "interface show": ("geometry_msgs/msg/Twist", "my_robot_msgs/msg/State --template"),
     "lifecycle get": ("", "/camera"),
@@ -319,6 +319,7 @@ def complete(argument: argparse.Action, what: str) -> None:
     Args:
         argument: As returned by ``add_argument``.
         what: ``topics``, ``services``, ``actions``, ``nodes``, ``messages``, ``interfaces`` (all
-            kinds of types), ``service_types`` or ``action_types``; or, for files, ``*.qml``.
+            kinds of types), ``service_types``, ``action_types`` or ``examples``; or, for files,
+            ``*.qml``.
     """
     argument.completes = what  # type: ignore[attr-defined]
