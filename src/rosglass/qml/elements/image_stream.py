@@ -6,7 +6,9 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
 
 from rosglass.comm.statistics import Pace, note_time, rate_of
 from rosglass.comm.time import Time
@@ -29,6 +31,8 @@ _RATE_WINDOW, _LATENCY_WINDOW = 30, 10
 #: Factor by which the wanted interval must exceed the possible one before images are fetched
 #: one by one.
 _HYSTERESIS = 1.1
+#: Bytes of an image that are compared with those of the image before.
+_COMPARED = 1 << 14
 #: Decay of the estimated cost of fetching, per image that was not fetched.
 _FORGETTING = 0.9
 
@@ -122,6 +126,9 @@ class SharedStream(QtCore.QObject):
         self._period = self._price = 0.0
         self._asked: float | None = None
         self._last_stamp: Time | None = None
+        #: Compared bytes of the last image; when the first and the last image with them arrived.
+        self._content: Any = None
+        self._changed_at = self._compared_at = 0.0
         self._balancer = LoadBalancer.of(session)
         executor = session.executor
         self.stream = ImageStream(
@@ -206,6 +213,11 @@ class SharedStream(QtCore.QObject):
         """Milliseconds from stamp to arrival, from there to display, and in total; -1 unknown."""
         return _mean(self._network), _mean(self._processing), _mean(self._total)
 
+    @property
+    def unchanged(self) -> float:
+        """Seconds during which images arrived that all had the same pixels."""
+        return self._compared_at - self._changed_at
+
     # Viewers and their looks.
 
     def _take_out(self, viewer: Viewer) -> None:
@@ -283,6 +295,7 @@ class SharedStream(QtCore.QObject):
         late = self.stream.lateness(sample)
         looks = {channel.look for channel in channels}
         made, failed = self._renderer.render(image, sample.received, late, looks)
+        self._compare(image)
         for channel in channels:
             channel.take(now)
             channel.problem = failed.get(channel.look, "")
@@ -296,6 +309,13 @@ class SharedStream(QtCore.QObject):
         else:
             self._price, self._asked = now - self._asked, None
         self._rest_if_possible()
+
+    def _compare(self, image: RawImage) -> None:
+        """Find out whether an image has other pixels than the one before."""
+        content = _sampled(image)
+        self._compared_at = self._session.steady()
+        if content != self._content:
+            self._content, self._changed_at = content, self._compared_at
 
     def _hand_over(self, pending: _Pending) -> None:
         with self._lock:
@@ -327,6 +347,17 @@ class SharedStream(QtCore.QObject):
     def _node_changed(self) -> None:
         if self._session.node is not self._key[0]:
             self.close()
+
+
+def _sampled(image: RawImage) -> tuple[int, int, bytes]:
+    """Return the size of an image, and bytes from all over it.
+
+    The noise of a camera changes some of them in every image.
+    """
+    data = np.frombuffer(image.data, np.uint8)
+    # Odd, so that it visits all channels and columns.
+    step = data.size // _COMPARED | 1
+    return image.width, image.height, data[::step].tobytes()
 
 
 def _mean(values: deque[float]) -> float:

@@ -154,6 +154,8 @@ class ImageTransportSubscription(LookElement):
     topicChanged = Signal()
     videoSinkChanged = Signal()
     playbackStateChanged = Signal()
+    #: An image was handed to the video sink.
+    imageShown = Signal()
     #: An image was saved to this file (absolute path).
     snapshotSaved = Signal(str)
     #: Saving an image failed, for this reason.
@@ -170,6 +172,10 @@ class ImageTransportSubscription(LookElement):
     )
     subscribed = ReadOnly(bool, False)
     transport = ReadOnly(str, "")
+    #: Seconds since the shown image arrived, more if it was late; -1 before the first.
+    age = ReadOnly(float, -1.0)
+    #: Seconds during which images arrived that all had the same pixels.
+    unchanged = ReadOnly(float, 0.0)
     framerate = ReadOnly(float, 0.0, tolerance=0.01)
     #: Milliseconds, -1 while unknown.
     networkLatency = ReadOnly(float, -1.0, tolerance=0.01)
@@ -384,7 +390,7 @@ class ImageTransportSubscription(LookElement):
         if not is_alive(self) or sink is None or not sink.is_alive or self._paused:
             return
         # An image delayed by an interrupted link would be cleared immediately.
-        if self.timeout and self._age(picture) > self._max_age_s:
+        if self.timeout and self._age_of(picture) > self._max_age_s:
             return
         try:
             if not sink.show(picture):
@@ -394,8 +400,19 @@ class ImageTransportSubscription(LookElement):
             return
         self._picture, self._blank, self._outdated = picture, False, False
         frame = picture.frame
-        if report(self, encoding=frame.encoding, hasAlpha=frame.has_alpha, isColor=frame.is_color):
+        stream = self._endpoint
+        alive = report(
+            self,
+            encoding=frame.encoding,
+            hasAlpha=frame.has_alpha,
+            isColor=frame.is_color,
+            age=round(max(0.0, self._age_of(picture)), 2),
+            unchanged=0.0 if stream is None else round(stream.unchanged, 1),
+        )
+        if alive:
             self._update_stale()
+        if is_alive(self):
+            self.imageShown.emit()
 
     def stream_changed(self) -> None:
         """Emit the signals of changed properties; called by the stream on the GUI thread."""
@@ -406,6 +423,7 @@ class ImageTransportSubscription(LookElement):
     def _clear_shown(self) -> None:
         """Remove the image from the screen."""
         self._picture, self._blank = None, True
+        report(self, age=-1.0, unchanged=0.0)
         if self._sink is not None:
             self._sink.clear()
 
@@ -416,12 +434,12 @@ class ImageTransportSubscription(LookElement):
         """Seconds after which an image counts as old."""
         return (self.timeout or DEFAULT_TIMEOUT_MS) / 1000 + self._interval
 
-    def _age(self, picture: Picture) -> float:
+    def _age_of(self, picture: Picture) -> float:
         return self._steady() - picture.made + picture.late
 
     def _is_old(self) -> bool:
         picture = self._picture
-        return self._paused or picture is None or self._age(picture) > self._max_age_s
+        return self._paused or picture is None or self._age_of(picture) > self._max_age_s
 
     def _update_stale(self) -> None:
         super()._update_stale()
@@ -450,11 +468,13 @@ class ImageTransportSubscription(LookElement):
         shared = self._endpoint
         channel = shared.channel(self) if shared is not None else None
         framerate, latencies = 0.0, (-1.0, -1.0, -1.0)
+        picture = self._picture
         if shared is not None and channel is not None and not self.stale:
             # The rate of a stream that is no longer live is meaningless.
             framerate, latencies = channel.frame_rate, shared.latencies
         report(
             self,
+            age=-1.0 if picture is None else round(max(0.0, self._age_of(picture)), 2),
             subscribed=shared is not None and shared.stream.subscribed,
             transport=shared.stream.transport if shared is not None else "",
             framerate=framerate,

@@ -1,0 +1,18 @@
+import QtQuick 2.15
+import QtQuick.Window 2.15
+import Ros2 1.0
+import RosControls 1.0
+
+Window {
+    width: 640; height: 360
+    visible: true
+    title: "CameraView"
+    color: Theme.background
+    Component.onCompleted: Ros2.init("camera_view")
+
+    CameraView {
+        anchors.fill: parent
+        topic: "/camera/image_raw"
+        title: "front camera"
+    }
+}
