@@ -76,5 +76,5 @@ def random_points(count: int, seed: int = 1, size: float = 10.0) -> dict[str, np
 
 
 def packed_color(red: int, green: int, blue: int, alpha: int = 0) -> int:
-    """Return a color as in the fields rgb and rgba."""
+    """Return a colour as in the fields rgb and rgba."""
     return alpha << 24 | red << 16 | green << 8 | blue

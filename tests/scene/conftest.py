@@ -129,7 +129,7 @@ class SceneBench:
         return rows[:, : image.width() * 3].reshape(image.height(), image.width(), 3).copy()
 
     def pixel(self, x: int = 200, y: int = 200) -> tuple[int, ...]:
-        """Return the color of a pixel of the window."""
+        """Return the colour of a pixel of the window."""
         return tuple(int(part) for part in self.picture()[y, x])
 
     def drawn(self) -> int:

@@ -355,7 +355,7 @@ def robot(bench: SceneBench, watch: Watch) -> Robot:
 MAY_BE_ANYTHING = {
     *("range", "range_min", "range_max", "ranges", "intensities", "temperature", "values"),
 }
-#: Angles, of which any finite number is one, limits, and colors that are cut off at 1.
+#: Angles, of which any finite number is one, limits, and colours that are cut off at 1.
 MAY_BE_LARGE = {
     "colors",
     *("angle_min", "angle_increment", "field_of_view", "min_range", "max_range", "time_increment"),
@@ -645,7 +645,7 @@ def test_colors_that_do_not_fit_are_named(robot: Robot) -> None:
     robot.show(Case("Marker", "visualization_msgs/Marker", marker(4)))
     robot.send(marker(4, colors=[COLOR] * 4))
     robot.bench.wait(lambda: robot.display.statusLevel == "warn")
-    assert "shapes/1: colors: 4 for 6 points: they have the marker's color" in (
+    assert "shapes/1: colors: 4 for 6 points: they have the marker's colour" in (
         robot.display.statusText
     )
 

@@ -220,7 +220,7 @@ def test_many_triangle_lists_are_drawn_together_and_look_the_same(
     show(marker(1, action=DELETE_ALL, ns=""))
     monkeypatch.setattr(module, "_MAX_ALONE", 0)
     show(*markers)
-    # Lit ones, one with colors of its own, and a translucent one.
+    # Lit ones, one with colours of its own, and a translucent one.
     assert [(len(one.shape.rows), one.lit) for one in drawables(display)] == [
         *((6, True), (3, False), (3, True)),
     ]
@@ -570,7 +570,7 @@ def test_markers_with_one_mesh_share_its_texture(
 ) -> None:
     uri = textured_triangle(tmp_path)
     first = marker(10, mesh_resource=uri, mesh_use_embedded_materials=True)
-    # Another color, which needs a drawable of its own.
+    # Another colour, which needs a drawable of its own.
     second = {**first, "id": 1, "color": {**RED, "g": 0.5}}
     display = show(first, second)
     # Each has its texture, and its colour over it.

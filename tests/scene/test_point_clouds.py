@@ -1,4 +1,4 @@
-"""The displays of point clouds: colors, styles, Decay Time, motion of a laser scanner."""
+"""The displays of point clouds: colours, styles, Decay Time, motion of a laser scanner."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Shown:
         return self.bench.send(self.publisher, message, self.display)
 
     def at(self, x: float, y: float, picture: Any = None) -> tuple[int, ...]:
-        """Return the color of the frame at a position on the ground."""
+        """Return the colour of the frame at a position on the ground."""
         picture = self.bench.picture() if picture is None else picture
         row, column = round(CENTER[0] - y * PIXELS_PER_M), round(CENTER[1] + x * PIXELS_PER_M)
         return tuple(int(part) for part in picture[row, column])
@@ -512,7 +512,7 @@ def test_a_depth_image_has_the_color_of_its_time(bench: SceneBench) -> None:
     display = camera.color((255, 0, 0), 1)
     assert display.statusLevel != "error", display.statusText
     camera.depth([4000] * 4, 2)
-    assert display.points == 0, "a color image of a nearer time may follow"
+    assert display.points == 0, "a colour image of a nearer time may follow"
     camera.color((0, 255, 0), 2)
     assert display.points == 4
     assert tuple(bench.picture()[CENTER[0] - 20, CENTER[1] - 20]) == (0, 255, 0)
@@ -520,7 +520,7 @@ def test_a_depth_image_has_the_color_of_its_time(bench: SceneBench) -> None:
     camera.depth([4000] * 4, 3)
     assert tuple(bench.picture()[CENTER[0] - 20, CENTER[1] - 20]) == (0, 255, 0)
     display = camera.depth([4000] * 4, 8, header={"frame_id": "map"})
-    assert "the frame of the depth image is [map], that of the color image [camera]" in (
+    assert "the frame of the depth image is [map], that of the colour image [camera]" in (
         display.statusText
     )
 
@@ -530,10 +530,10 @@ def test_color_images_that_stop_are_an_error(bench: SceneBench) -> None:
     camera.send("/camera/depth/camera_info", CAMERA)
     camera.color((255, 0, 0), 2)
     assert camera.depth([4000] * 4, 2).statusLevel == "ok"
-    assert camera.depth([4000] * 4, 5).statusLevel == "ok", "its color image may follow"
+    assert camera.depth([4000] * 4, 5).statusLevel == "ok", "its colour image may follow"
     display = camera.depth([4000] * 4, 6)
     assert display.statusLevel == "error"
-    text = "the last color image of /camera/rgb/image_raw is 4 s older than the depth image"
+    text = "the last colour image of /camera/rgb/image_raw is 4 s older than the depth image"
     assert text in display.statusText
     assert camera.color((0, 255, 0), 6).statusLevel == "ok", display.statusText
 

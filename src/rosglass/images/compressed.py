@@ -201,7 +201,7 @@ def decompress(
 
     Args:
         data: The bytes of the file.
-        format: The message's ``format`` field, with the order of the color channels, or the
+        format: The message's ``format`` field, with the order of the colour channels, or the
             camera's Bayer pattern.
         stamp: Time of the image.
         frame_id: Coordinate frame of the camera.

@@ -1,4 +1,4 @@
-"""Depth images in colors, black where the depth is unknown; images of numbers in greys."""
+"""Depth images in colours, black where the depth is unknown; images of numbers in greys."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["COLOR_MAPS", "DEPTH_ENCODINGS", "DepthColors", "GreyLevels", "GreyRange"]
 
-#: Color maps, from near to far.
+#: Colour maps, from near to far.
 COLOR_MAPS = ("turbo", "viridis", "jet", "gray")
 #: Encodings that can hold depths.
 DEPTH_ENCODINGS = ("16UC1", "mono16", "32FC1")
@@ -35,7 +35,7 @@ _MIN_SPAN = 0.01
 
 @cache
 def _palette(name: str) -> NDArray[np.uint32]:
-    """Return 256 colors as RGBX, and black for unknown depths."""
+    """Return 256 colours as RGBX, and black for unknown depths."""
     ramp = np.arange(256, dtype=np.uint8)
     colors = np.zeros((257, 4), np.uint8)
     if name == "gray":
@@ -52,12 +52,12 @@ class DepthColors:
     """Colors the depth images of a camera.
 
     Args:
-        colors: Name of the color map, one of :data:`COLOR_MAPS`.
-        near: Depth of the first color in metres; None to follow the images.
-        far: Depth of the last color in metres; None to follow the images.
+        colors: Name of the colour map, one of :data:`COLOR_MAPS`.
+        near: Depth of the first colour in metres; None to follow the images.
+        far: Depth of the last colour in metres; None to follow the images.
 
     Raises:
-        UnsupportedError: The color map is unknown, or the range is empty.
+        UnsupportedError: The colour map is unknown, or the range is empty.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class DepthColors:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Depths of the first and the last color in metres."""
+        """Depths of the first and the last colour in metres."""
         near, far = self._seen or (0.0, 1.0)
         near = near if self._near is None else self._near
         far = far if self._far is None else self._far
@@ -211,7 +211,7 @@ class GreyLevels:
 
 
 def _steps(depths: NDArray[Any], near: float, far: float) -> NDArray[np.uint16]:
-    """Return the index of each depth's color; 256 where the depth is unknown."""
+    """Return the index of each depth's colour; 256 where the depth is unknown."""
     scale = 255.0 / (far - near)
     steps = depths * np.float32(scale)
     steps -= np.float32(near * scale)

@@ -125,7 +125,7 @@ class Frame:
 
     @property
     def is_color(self) -> bool:
-        """True if pixels have colors, not only a brightness."""
+        """True if pixels have colours, not only a brightness."""
         return self.format not in {PixelFormat.GRAY8, PixelFormat.GRAY16}
 
 
@@ -193,7 +193,7 @@ def _nv24(pixels: Array) -> tuple[PixelFormat, Array]:
 
 
 def _wide(code: str, format: PixelFormat) -> Callable[[Array], tuple[PixelFormat, Array]]:
-    """Return a conversion of 16-bit colors that keeps the high bytes."""
+    """Return a conversion of 16-bit colours that keeps the high bytes."""
 
     def convert_wide(pixels: Array) -> tuple[PixelFormat, Array]:
         return format, _to_rgba(_high_bytes(pixels), code)
@@ -358,7 +358,7 @@ def convert(
 ) -> Frame:
     """Convert an image for display.
 
-    Depth in metres (32FC1) becomes millimetres, as in 16UC1 depth images; 16-bit colors keep their
+    Depth in metres (32FC1) becomes millimetres, as in 16UC1 depth images; 16-bit colours keep their
     high bytes; 8UC3 and 8UC4 are BGR(A) as in OpenCV; 8UC2 is displayed as red and green.
 
     Args:
@@ -367,7 +367,7 @@ def convert(
             assumed.
         received: Time of reception.
         allocate: Returns memory for an image of a width and height, as rows x columns x RGBX; used
-            if colors are converted, to write them directly to the display's memory.
+            if colours are converted, to write them directly to the display's memory.
 
     Raises:
         UnsupportedError: The encoding is not supported.

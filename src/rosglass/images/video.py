@@ -5,7 +5,7 @@ In messages of ffmpeg_image_transport, the ``encoding`` field begins with a code
 (``h264_nvenc``).
 
 theora_image_transport sends Ogg Theora without Ogg (Theora Specification, Xiph.Org, sections 6 and
-7). The stream begins with three header packets; its colors have the full range, as OpenCV's YCrCb.
+7). The stream begins with three header packets; its colours have the full range, as OpenCV's YCrCb.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ __all__ = ["FfmpegDecoder", "TheoraDecoder", "VideoDecoder", "pyav"]
 
 #: Number of frames whose stamp is kept until the decoder has reordered them.
 _MAX_REORDERED = 64
-#: Color spaces (ITU-T H.273) that displays assume: unspecified, BT.470BG, SMPTE 170M.
+#: Colour spaces (ITU-T H.273) that displays assume: unspecified, BT.470BG, SMPTE 170M.
 _STANDARD = {2, 5, 6}
 _FULL_RANGE = 2
 

@@ -39,7 +39,7 @@ _MAX_WAITING = 4
 _TIME_BASE = Fraction(1, 1000)
 #: Seconds that closing waits for the encoder, before and after its last frame.
 _CLOSE_TIMEOUT_S = 1.5
-#: The number of BT.709 in ITU-T H.273: the colors that players assume for frames of this size.
+#: The number of BT.709 in ITU-T H.273: the colours that players assume for frames of this size.
 _BT709 = 1
 
 
@@ -196,7 +196,7 @@ class VideoWriter:
         self._first = item.time
 
     def _fit(self, frame: Any) -> Any:
-        """Return a frame in the size and the colors of the file."""
+        """Return a frame in the size and the colours of the file."""
         width, height = self._stream.width, self._stream.height
         if abs(frame.width - width) > 1 or abs(frame.height - height) > 1:
             share = min(width / frame.width, height / frame.height)

@@ -29,7 +29,7 @@ _PIXEL_BYTES = {
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The view of an image: a region, whose center is zoomed, mirrored and rotated.
+    """The view of an image: a region, whose centre is zoomed, mirrored and rotated.
 
     Attributes:
         rotation: Rotation clockwise in degrees, a multiple of 90.
@@ -37,7 +37,7 @@ class View:
         flipped: Whether top and bottom are swapped.
         region: x, y, width and height of the part to show, in pixels of the received image; None
             for all of it.
-        zoom: Zoom factor: 2 shows the center half of width and height. Pixels are not scaled; the
+        zoom: Zoom factor: 2 shows the centre half of width and height. Pixels are not scaled; the
             display does that.
 
     Raises:
@@ -101,7 +101,7 @@ class View:
 
 
 def _center_region(width: int, height: int, zoom: float) -> tuple[int, int, int, int]:
-    """Return the center region at even coordinates, which needs no conversion of YUV."""
+    """Return the centre region at even coordinates, which needs no conversion of YUV."""
     x, y = (round(size * (1 - 1 / zoom) / 4) * 2 for size in (width, height))
     x, y = min(x, (width - 1) // 4 * 2), min(y, (height - 1) // 4 * 2)
     return x, y, width - 2 * x, height - 2 * y

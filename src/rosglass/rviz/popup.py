@@ -39,7 +39,7 @@ class Popup(WidgetOverlay):
     """A widget of its own size, above all overlays that are not popups, and kept inside the view.
 
     While the point that it follows is outside the view or behind the camera, it is hidden; a modal
-    popup is centered instead.
+    popup is centred instead.
 
     Args:
         content: The widget, or a function that returns it.

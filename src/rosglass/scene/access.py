@@ -781,7 +781,7 @@ class SceneDisplays(displays.Displays):
             ),
             f"{_OPTIONS}/Background Color": _Property(
                 KINDS["color"](),
-                "Color of the background.",
+                "Colour of the background.",
                 lambda: view.property("background"),
                 lambda color: view.setProperty("background", color),
             ),

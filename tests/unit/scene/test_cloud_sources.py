@@ -238,7 +238,7 @@ def test_a_color_image_colors_the_points(encoding: str, channels: int, colors: l
         ({}, {"p": [nan] * 12}, None, "12 finite numbers"),
         ({}, {"binning_x": -1}, None, "binning_x"),
         ({}, {"roi": None}, None, "x_offset"),
-        ({}, {}, {"encoding": "yuv422"}, "colors are one of mono8"),
+        ({}, {}, {"encoding": "yuv422"}, "colours are one of mono8"),
         ({}, {}, {"width": 2, "height": 4}, "2x4 pixels, the depth image 4x2"),
     ],
 )
@@ -262,7 +262,7 @@ class RvizLayers:
         self.kept: dict[int, tuple[float, float, int]] = {}
 
     def add(self, depths: np.ndarray, colors: np.ndarray, now_s: float) -> list[tuple[float, int]]:
-        """Return depth and color of all points of an image."""
+        """Return depth and colour of all points of an image."""
         found = []
         for pixel, (depth, color) in enumerate(zip(depths.tolist(), colors.tolist(), strict=True)):
             if pixel in self.kept and self.kept[pixel][1] < now_s:

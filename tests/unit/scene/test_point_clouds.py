@@ -187,7 +187,7 @@ def test_hostile_bytes_raise_errors_of_rosglass_only() -> None:
         broken["data"] = message["data"][: int(random.choice([96, 96, 95, 48, 0]))]
         try:
             found = Cloud.from_message(broken)
-            # As the color transformers do, which say what they support.
+            # As the colour transformers do, which say what they support.
             color = found.layout.find("rgb")
             is_usable = color is not None and color.is_packed_color
             vertices = found.vertex_data(COLOR if is_usable else None)

@@ -1,4 +1,4 @@
-"""Colors of points: RViz's transformers, their choice, and the formulas of the shader."""
+"""Colours of points: RViz's transformers, their choice, and the formulas of the shader."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def intensities(*values: float) -> Cloud:
 
 
 def shader(colors: PointColors, position: np.ndarray, channel: Any) -> list[float]:
-    """Compute one color step by step as the docstring of Coloring says."""
+    """Compute one colour step by step as the docstring of Coloring says."""
     if colors.mode == "flat":
         return [*colors.first, 1.0]
     if colors.mode == "bgra":

@@ -290,7 +290,7 @@ class DisplaysModel(QAbstractListModel):
             )  # fmt: skip
             yield PanelRow(
                 (*key, _BACKGROUND), 1, _BACKGROUND, "color",
-                view.property("background").name(), "Color of the background.",
+                view.property("background").name(), "Colour of the background.",
             )  # fmt: skip
         problem, level = str(view.property("problem")), "error"
         session = scene._session

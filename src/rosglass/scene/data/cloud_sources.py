@@ -51,7 +51,7 @@ def cloud_from_columns(columns: Mapping[str, Any], warnings: Sequence[str] = ())
 
     Args:
         columns: Arrays of the same length by name of the field, x, y and z among them. uint32 (for
-            packed colors) stays so, all others become float32.
+            packed colours) stays so, all others become float32.
         warnings: Texts for the display's status.
 
     Raises:
@@ -184,7 +184,7 @@ def _move(
     return moved
 
 
-#: Order of red, green and blue in color images that color depth images.
+#: Order of red, green and blue in colour images that colour depth images.
 _RED_GREEN_BLUE = {
     "rgb8": (0, 1, 2),
     "rgba8": (0, 1, 2),
@@ -217,7 +217,7 @@ class _DepthPixels(NamedTuple):
     """The known pixels of a depth image.
 
     Attributes:
-        values: x, y, z and the packed color of each, float32.
+        values: x, y, z and the packed colour of each, float32.
         known: Their indices in the image, row by row.
         camera: Size of the image and its projection, which identify the camera.
     """
@@ -335,7 +335,7 @@ def _raw_image(message: Any) -> RawImage:
 
 
 def _projection(camera_info: Any) -> tuple[float, float, float, float]:
-    """Return focal lengths and center of the rectified image, in its own pixels."""
+    """Return focal lengths and centre of the rectified image, in its own pixels."""
     p = _numbers(read_field(camera_info, _CAMERA, "p", "P"), _CAMERA, "p")
     if len(p) != 12 or not np.isfinite(p).all():
         raise DecodeError(_CAMERA, f"expected 12 finite numbers, got {shown(p.tolist())}", "p")
@@ -359,7 +359,7 @@ def _packed_colors(color: RawImage, depth: RawImage) -> NDArray[np.uint32]:
     if (color.width, color.height) != (depth.width, depth.height):
         raise DecodeError(
             _IMAGE,
-            f"the color image is {color.width}x{color.height} pixels, the depth image "
+            f"the colour image is {color.width}x{color.height} pixels, the depth image "
             f"{depth.width}x{depth.height}; use a registered depth image",
             "width",
         )
@@ -368,7 +368,7 @@ def _packed_colors(color: RawImage, depth: RawImage) -> NDArray[np.uint32]:
     if color.encoding not in _RED_GREEN_BLUE:
         known = ", ".join(("mono8", "8UC1", *_RED_GREEN_BLUE))
         raise DecodeError(
-            _IMAGE, f"colors are one of {known}, got {shown(color.encoding)}", "encoding"
+            _IMAGE, f"colours are one of {known}, got {shown(color.encoding)}", "encoding"
         )
     pixels = pixels_of(color, ENCODINGS[color.encoding])
     packed = np.zeros(pixels.shape[:2], np.uint32)

@@ -278,8 +278,8 @@ class Channel:
 
     Attributes:
         fields: The field, or three whose values from 0 to 1 are red, green and blue.
-        is_color: Whether it is a color, as the bytes blue, green, red, alpha; otherwise a float32.
-        is_grey: Whether the color is made grey.
+        is_color: Whether it is a colour, as the bytes blue, green, red, alpha; otherwise a float32.
+        is_grey: Whether the colour is made grey.
     """
 
     fields: tuple[str, ...]
@@ -485,10 +485,10 @@ class Cloud:
         """Return the vertices for the graphics card, without copying where it can read the bytes.
 
         It can if values are little-endian, steps and offsets are multiples of 4, x, y and z are
-        adjacent float32, and the channel is a float32 or a packed color.
+        adjacent float32, and the channel is a float32 or a packed colour.
 
         Args:
-            channel: The channel that colors need; None for positions alone.
+            channel: The channel that colours need; None for positions alone.
         """
         is_bytes = channel is not None and channel.is_color
         offsets = self._direct_offsets(channel)
@@ -533,7 +533,7 @@ class Cloud:
         return (x.offset, field.offset) if usable else None
 
     def color_bytes(self, channel: Channel) -> NDArray[np.uint8]:
-        """Return a channel that is a color, as points x (blue, green, red, alpha)."""
+        """Return a channel that is a colour, as points x (blue, green, red, alpha)."""
         names = channel.fields
         if len(names) == 1:
             field = self.layout.find(names[0])
@@ -555,7 +555,7 @@ class Cloud:
         """Return names and values of a point's fields for the Selection panel.
 
         The position is the first; names of others have the number of the field, as in RViz. Packed
-        colors are r, g, b, a from 0 to 255.
+        colours are r, g, b, a from 0 to 255.
         """
         layout = self.layout
         row, column = divmod(index, layout.width)

@@ -42,9 +42,9 @@ if TYPE_CHECKING:
 
 __all__ = ["DepthCloudDisplay"]
 
-#: Encodings of depth images; others are color images.
+#: Encodings of depth images; others are colour images.
 _DEPTH_ENCODINGS = ("16UC1", "mono16", "32FC1")
-#: Seconds that color images may be behind depth images, which wait for them.
+#: Seconds that colour images may be behind depth images, which wait for them.
 _MAX_BEHIND_S = 3.0
 #: Motion of a depth camera after which hidden points are dropped, as in RViz.
 _MOVED_M, _MOVED_DEG = 0.01, 0.5
@@ -53,13 +53,13 @@ _COMPRESSED_DEPTH = "compressedDepth"
 
 
 class _DepthMatcher:
-    """Combines depth images with the camera's calibration, and with color images of the same time.
+    """Combines depth images with the camera's calibration, and with colour images of the same time.
 
     Used in the node's threads.
 
     Args:
         info_topic: Topic of the calibration, for errors.
-        color_topic: The same of color images; empty if depth images have no color.
+        color_topic: The same of colour images; empty if depth images have no colour.
         size: How many images wait for others.
     """
 
@@ -72,7 +72,7 @@ class _DepthMatcher:
         self._colors: deque[Any] = deque()
 
     def match(self, message: Any) -> tuple[Any, Any, Any] | None:
-        """Take a message, and return a depth image, its calibration and color once all are there.
+        """Take a message, and return a depth image, its calibration and colour once all are there.
 
         Raises:
             Error: Something is missing; the text says what.
@@ -98,13 +98,13 @@ class _DepthMatcher:
             return self._pair()
 
     def _pair(self) -> tuple[Any, Any, Any] | None:
-        """Return the newest depth image whose color is known: that of the nearest time."""
+        """Return the newest depth image whose colour is known: that of the nearest time."""
         if not self._depths:
             return None
         colors = [(frame_and_stamp(color)[1], color) for color in self._colors]
         if not colors:
             if len(self._depths) == self._size:
-                raise Error(f"no color image received; publish it on {self._color_topic}")
+                raise Error(f"no colour image received; publish it on {self._color_topic}")
             return None
         for at in range(len(self._depths) - 1, -1, -1):
             depth = self._depths[at]
@@ -117,7 +117,7 @@ class _DepthMatcher:
         behind_s = (frame_and_stamp(self._depths[-1])[1] - max(when for when, _ in colors)) * 1e-9
         if behind_s > _MAX_BEHIND_S:
             raise Error(
-                f"the last color image of {self._color_topic} is {behind_s:.0f} s older than the "
+                f"the last colour image of {self._color_topic} is {behind_s:.0f} s older than the "
                 "depth image"
             )
         return None
@@ -151,7 +151,7 @@ def _prepare_depth(
         cloud, hidden = occlusion.add(image, info, colors, now_s)
     if color is not None and color.header.frame_id != depth.header.frame_id:
         text = (
-            f"the frame of the depth image is [{depth.header.frame_id}], that of the color image "
+            f"the frame of the depth image is [{depth.header.frame_id}], that of the colour image "
             f"[{color.header.frame_id}]; use a registered depth image"
         )
         cloud.warnings = (*cloud.warnings, text)
@@ -186,7 +186,7 @@ def _decompress(message: Any) -> Any:
 
 
 class DepthCloudDisplay(CloudDisplay):
-    """The points of a depth image, and their colors. See its page in ``docs/scene.md``."""
+    """The points of a depth image, and their colours. See its page in ``docs/scene.md``."""
 
     TYPE = "DepthCloud"
     MESSAGES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/CameraInfo")
@@ -198,7 +198,7 @@ class DepthCloudDisplay(CloudDisplay):
         choices=["raw", _COMPRESSED_DEPTH], then="_on_topic",
     )  # fmt: skip
     colorTransport = Setting(
-        "Color Transport Hint", "enum", "raw", "Transport of color images.",
+        "Color Transport Hint", "enum", "raw", "Transport of colour images.",
         choices=["raw", "compressed"], then="_on_topic",
     )  # fmt: skip
     colorTopic = Setting(
@@ -234,7 +234,7 @@ class DepthCloudDisplay(CloudDisplay):
         super().__init__(parent, runtime)
 
     def further_topics(self, topic: str) -> tuple[str, ...]:
-        """Return the topics of the calibration, and of color images."""
+        """Return the topics of the calibration, and of colour images."""
         colors = self._resolve_further("Color Image Topic", self.colorTopic)
         return (
             camera_info_topic(topic),

@@ -50,7 +50,7 @@ class PointStampedDisplay(HistoryDisplay):
     LENGTH = "History Length"
     MESSAGES = ("geometry_msgs/PointStamped",)
 
-    color = Setting("Color", "color", "#cc29cc", "Color of the sphere.")
+    color = Setting("Color", "color", "#cc29cc", "Colour of the sphere.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     radius = Setting("Radius", "float", 0.2, "Radius of the sphere, in metres.", min=0.0)
     historyLength = Setting(
@@ -75,7 +75,7 @@ class PolygonDisplay(HistoryDisplay):
     TYPE = "Polygon"
     MESSAGES = ("geometry_msgs/PolygonStamped",)
 
-    color = Setting("Color", "color", "#19ff00", "Color of the outline.")
+    color = Setting("Color", "color", "#19ff00", "Colour of the outline.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
 
     def preparer(self) -> Callable[[Any], Any]:
@@ -109,7 +109,7 @@ class RangeDisplay(HistoryDisplay):
     IS_CONTINUOUS = True
     MESSAGES = ("sensor_msgs/Range",)
 
-    color = Setting("Color", "color", "#ffffff", "Color of the cone.")
+    color = Setting("Color", "color", "#ffffff", "Colour of the cone.")
     alpha = Setting("Alpha", "float", 0.5, "Opacity.", min=0.0, max=1.0)
     bufferLength = Setting(
         "Buffer Length", "int", 1, "Number of messages.", min=1, then="_on_length"
@@ -234,8 +234,8 @@ class WrenchStampedDisplay(HistoryDisplay):
     MESSAGES = ("geometry_msgs/WrenchStamped",)
 
     alpha, arrowWidth, historyLength, hideSmallValues = _screw_settings()
-    forceColor = Setting("Force Color", "color", "#cc3333", "Color of the force.")
-    torqueColor = Setting("Torque Color", "color", "#cccc33", "Color of the torque.")
+    forceColor = Setting("Force Color", "color", "#cc3333", "Colour of the force.")
+    torqueColor = Setting("Torque Color", "color", "#cccc33", "Colour of the torque.")
     forceArrowScale = Setting(
         "Force Arrow Scale", "float", 2.0, "Arrow length in metres per newton."
     )
@@ -263,8 +263,8 @@ class TwistStampedDisplay(HistoryDisplay):
     MESSAGES = ("geometry_msgs/TwistStamped",)
 
     alpha, arrowWidth, historyLength, hideSmallValues = _screw_settings()
-    linearColor = Setting("Linear Color", "color", "#cc3333", "Color of the linear velocity.")
-    angularColor = Setting("Angular Color", "color", "#cccc33", "Color of the angular velocity.")
+    linearColor = Setting("Linear Color", "color", "#cc3333", "Colour of the linear velocity.")
+    angularColor = Setting("Angular Color", "color", "#cccc33", "Colour of the angular velocity.")
     linearArrowScale = Setting(
         "Linear Arrow Scale", "float", 2.0, "Arrow length in metres per m/s."
     )
@@ -292,9 +292,9 @@ class AccelStampedDisplay(HistoryDisplay):
     MESSAGES = ("geometry_msgs/AccelStamped",)
 
     alpha, arrowWidth, historyLength, hideSmallValues = _screw_settings()
-    linearColor = Setting("Linear Color", "color", "#cc3333", "Color of the linear acceleration.")
+    linearColor = Setting("Linear Color", "color", "#cc3333", "Colour of the linear acceleration.")
     angularColor = Setting(
-        "Angular Color", "color", "#cccc33", "Color of the angular acceleration."
+        "Angular Color", "color", "#cccc33", "Colour of the angular acceleration."
     )
     linearArrowScale = Setting(
         "Linear Arrow Scale", "float", 2.0, "Arrow length in metres per m/s²."

@@ -71,7 +71,7 @@ class GridDisplay(_InFrame):
         "Line Style/Line Width", "float", 0.03, "Width of billboards, in metres.", min=0.001,
         shown_if={"lineStyle": "Billboards"},
     )  # fmt: skip
-    color = Setting("Color", "color", "#a0a0a4", "Color of the lines.")
+    color = Setting("Color", "color", "#a0a0a4", "Colour of the lines.")
     alpha = Setting("Alpha", "float", 0.5, "Opacity.", min=0.0, max=1.0)
     plane = Setting("Plane", "enum", "XY", "Plane of the grid.", choices=["XY", "XZ", "YZ"])
     offset = Setting("Offset", "vector", [0, 0, 0], "Position of the grid's centre, in metres.")

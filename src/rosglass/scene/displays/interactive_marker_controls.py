@@ -99,7 +99,7 @@ class Control:
         self._grab: Matrix | None = None
         self._pose = self._turn = np.eye(4)
         self._angle_then = 0.0
-        #: The place on the control that a drag keeps under the mouse, and the center of rotations,
+        #: The place on the control that a drag keeps under the mouse, and the centre of rotations,
         #: in the control's frame.
         self._held = self._center = np.zeros(3)
         self._last: PointerEvent | None = None

@@ -96,7 +96,7 @@ class MapDisplay(TopicDisplay):
 
     alpha = Setting("Alpha", "float", 0.7, "Opacity.", min=0.0, max=1.0)
     colorScheme = Setting(
-        "Color Scheme", "enum", "map", "Colors of the values.", choices=["map", "costmap", "raw"]
+        "Color Scheme", "enum", "map", "Colours of the values.", choices=["map", "costmap", "raw"]
     )
     drawBehind = Setting("Draw Behind", "bool", False, "Draw it below everything else.")
     useTimestamp = Setting(
@@ -237,7 +237,7 @@ class GridCellsDisplay(TopicDisplay):
     TYPE = "GridCells"
     MESSAGES = ("nav_msgs/GridCells",)
 
-    color = Setting("Color", "color", "#19ff00", "Color of the cells.")
+    color = Setting("Color", "color", "#19ff00", "Colour of the cells.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
 
     def __init__(

@@ -83,7 +83,7 @@ _POINT_STYLES = {CUBE_LIST: "boxes", SPHERE_LIST: "spheres", POINTS: "squares"}
 _IDENTITY = np.eye(4)
 #: Markers that wait for a transform, of which the oldest make room, and their bytes.
 _MAX_LATE, _MAX_LATE_BYTES = 1000, 256 << 20
-#: Bytes of the points, colors and texts of all markers that are shown.
+#: Bytes of the points, colours and texts of all markers that are shown.
 _MAX_SHOWN_BYTES = 1 << 30
 #: Seconds after which no transform of a marker's time will come any more.
 _MAX_WAIT_S = 60.0
@@ -316,9 +316,9 @@ def _list_colors(colors: Any) -> NDArray[np.float32]:
 
 
 def _triangles_look(marker: MarkerRecord) -> tuple[Shape, tuple[float, ...], bool]:
-    """Return the shape of a triangle list, its color, and whether it is lit."""
+    """Return the shape of a triangle list, its colour, and whether it is lit."""
     shape = marker.triangles or triangles_of(marker)
-    # RViz does not light what has colors of its own.
+    # RViz does not light what has colours of its own.
     if len(marker.colors) in (len(marker.points), len(marker.points) // 3):
         return shape, (1.0, 1.0, 1.0, 1.0), False
     return shape, marker.color, True

@@ -41,7 +41,7 @@ class SolidBatch:
         self._keys: list[Key] = []
         self._matrices = np.zeros((16, 4, 4), np.float32)
         self._colors = np.zeros((16, 4), np.float32)
-        #: Instances put since the last flush, by slot: pose of the frame, matrix in it, color.
+        #: Instances put since the last flush, by slot: pose of the frame, matrix in it, colour.
         self._changed: dict[int, tuple[Matrix, Matrix, Color]] = {}
         self._dirty = True
 

@@ -33,7 +33,7 @@ class _MeshFile(NamedTuple):
     """A mesh file that was read.
 
     Attributes:
-        parts: For each part a drawable, with its texture, and the color of its material; None in
+        parts: For each part a drawable, with its texture, and the colour of its material; None in
             STL files, which have none.
         problem: Files that could not be read, in words; empty otherwise.
     """

@@ -57,7 +57,7 @@ _NAMES = [
     *("sphere_list", "points", "text_view_facing", "mesh_resource", "triangle_list", "arrow_strip"),
 ]
 _MAX_POINTS, MAX_MARKERS = 2_000_000, 100_000
-#: Types whose points may have a color each.
+#: Types whose points may have a colour each.
 _COLORED = (LINE_STRIP, LINE_LIST, CUBE_LIST, SPHERE_LIST, POINTS, TRIANGLE_LIST)
 #: Share of an arrow between two points that is its head, where no length is given, as in RViz.
 _HEAD_SHARE = 0.23
@@ -99,14 +99,14 @@ class MarkerRecord(NamedTuple):
         colors: (n, 4) or (0, 4).
         text: The text of texts.
         resource: URI of a mesh.
-        embedded: Whether a mesh has its own colors.
+        embedded: Whether a mesh has its own colours.
         problem: Why it is not drawn, in words; empty otherwise.
         warning: Why it may not look as it should, in words; empty otherwise.
         instances: Shapes that it consists of, where these are always the same ones, and the matrix
             of each in its frame; None to compute them when it is drawn.
         triangles: Of a triangle list, which may be long: its shape; None to make it when it is
             drawn.
-        size: About how many bytes its points, colors and text take.
+        size: About how many bytes its points, colours and text take.
     """
 
     key: tuple[str, int]
@@ -187,7 +187,7 @@ def _read_one(
     Args:
         message: The message.
         part: As for :func:`read_marker`.
-        numbers: Pose, scale and color.
+        numbers: Pose, scale and colour.
         is_finite: Whether all of these are, and can be drawn.
         warning: The warning about the record.
         pose: Matrix of the pose.
@@ -290,7 +290,7 @@ def _rows(items: Sequence[Any], read: Callable[[Any], Any], width: int) -> NDArr
 
 
 def _numbers_problem(numbers: list[float]) -> str:
-    """Return which of pose, scale and color has a number that cannot be drawn."""
+    """Return which of pose, scale and colour has a number that cannot be drawn."""
     try:
         for name, part in (
             ("pose", numbers[:7]),
@@ -304,11 +304,11 @@ def _numbers_problem(numbers: list[float]) -> str:
 
 
 def _colors_warning(kind: int, points: int, colors: NDArray[np.float32]) -> str:
-    """Return the problem with the colors of points; empty without one."""
+    """Return the problem with the colours of points; empty without one."""
     if kind not in _COLORED:
         return ""
     if len(colors) not in ((0, points, points // 3) if kind == TRIANGLE_LIST else (0, points)):
-        return f"colors: {len(colors)} for {points} points: they have the marker's color"
+        return f"colors: {len(colors)} for {points} points: they have the marker's colour"
     return "" if np.isfinite(colors).all() else "colors: a number is not finite: drawn as 0 or 1"
 
 

@@ -76,7 +76,7 @@ _MAX_SCAN_S = 10.0
 #: Metres, or half of the radians, up to which a scanner has not moved during a scan.
 _STILL = 1e-5
 
-#: Conditions of settings: the color transformers and styles that they belong to.
+#: Conditions of settings: the colour transformers and styles that they belong to.
 _INTENSITY = {"wanted_transformer": "Intensity"}
 _AXIS_COLOR = {"wanted_transformer": "AxisColor"}
 _RAINBOW = {**_INTENSITY, "useRainbow": True}
@@ -89,9 +89,9 @@ class PreparedCloud(NamedTuple):
 
     Attributes:
         cloud: The cloud.
-        transformer: Name of the color transformer.
+        transformer: Name of the colour transformer.
         vertices: Its vertices, with the channel that the transformer needs.
-        colors: Its colors, as if its frame was the fixed frame.
+        colors: Its colours, as if its frame was the fixed frame.
         is_translucent: Whether points have an opacity each, and not all are opaque.
         source: The message that it is from, if others belong to it, or it is needed again.
         duration_ns: Time from the first ray of a laser scan to its last one, nanoseconds.
@@ -111,7 +111,7 @@ class PreparedCloud(NamedTuple):
 
 
 class ColorSettings(NamedTuple):
-    """The settings of colors of a display, as values for the node's thread.
+    """The settings of colours of a display, as values for the node's thread.
 
     Attributes:
         chosen: The user's choice; empty for RViz's.
@@ -179,7 +179,7 @@ class _ShownCloud:
         )
 
     def restyle(self, settings: ColorSettings) -> PointColors | None:
-        """Apply the display's settings, and return the colors."""
+        """Apply the display's settings, and return the colours."""
         data, display = self._data, self.display
         if data is None:
             return None
@@ -202,7 +202,7 @@ class _ShownCloud:
 
     @property
     def transformer(self) -> str:
-        """Name of the color transformer in use."""
+        """Name of the colour transformer in use."""
         return "" if self._data is None else self._data.transformer
 
     def describe(self, number: int | None = None) -> list[tuple[str, str]]:
@@ -231,7 +231,7 @@ def _text_of(value: Any) -> str:
 
 
 def _channel(default: str) -> Setting:
-    text = "Field that Intensity colors by."
+    text = "Field that Intensity colours by."
     return Setting("Channel Name", "string", default, text, shown_if=_INTENSITY)
 
 
@@ -247,7 +247,7 @@ def _autocompute(default: bool) -> Setting:
 
 def _bound(path: str, default: float) -> Setting:
     name = "first" if "Min" in path else "last"
-    text = f"Value of the {name} color; metres for AxisColor."
+    text = f"Value of the {name} colour; metres for AxisColor."
     shown_if: dict[str, Any] = {**_INTENSITY, "autocomputeIntensityBounds": False}
     if "Intensity" not in path:
         shown_if = {**_AXIS_COLOR, "autocomputeValueBounds": False}
@@ -268,7 +268,7 @@ def size_setting(**conditions: Any) -> Setting:
 
 
 class CloudDisplay(TopicDisplay):
-    """Base class of displays of points: their settings, colors and Decay Time."""
+    """Base class of displays of points: their settings, colours and Decay Time."""
 
     #: Converts a message to a cloud, in the node's thread.
     READ: ClassVar[Callable[[Any], Cloud]] = Cloud.from_message
@@ -293,11 +293,11 @@ class CloudDisplay(TopicDisplay):
         choices=["", "XYZ"],
     )  # fmt: skip
     colorTransformer = Setting(
-        "Color Transformer", "enum", "", "Source of colors; empty for RViz's choice.",
+        "Color Transformer", "enum", "", "Source of colours; empty for RViz's choice.",
         choices=["", *COLOR_TRANSFORMERS],
     )  # fmt: skip
     axis = Setting(
-        "Axis", "enum", "Z", "Axis along which colors change (AxisColor).",
+        "Axis", "enum", "Z", "Axis along which colours change (AxisColor).",
         choices=["X", "Y", "Z"], shown_if=_AXIS_COLOR,
     )  # fmt: skip
     autocomputeValueBounds = Setting(
@@ -314,20 +314,20 @@ class CloudDisplay(TopicDisplay):
         "Color",
         "color",
         "#ffffff",
-        "Color of FlatColor.",
+        "Colour of FlatColor.",
         shown_if={"wanted_transformer": "FlatColor"},
     )
     channelName = _channel("intensity")
     useRainbow = Setting(
-        "Use rainbow", "bool", True, "Use rainbow colors instead of two colors.",
+        "Use rainbow", "bool", True, "Use rainbow colours instead of two colours.",
         shown_if=_INTENSITY,
     )  # fmt: skip
     invertRainbow = _invert(False)
     minColor = Setting(
-        "Min Color", "color", "#000000", "Color of the minimum.", shown_if=_TWO_COLORS
+        "Min Color", "color", "#000000", "Colour of the minimum.", shown_if=_TWO_COLORS
     )
     maxColor = Setting(
-        "Max Color", "color", "#ffffff", "Color of the maximum.", shown_if=_TWO_COLORS
+        "Max Color", "color", "#ffffff", "Colour of the maximum.", shown_if=_TWO_COLORS
     )
     autocomputeIntensityBounds = _autocompute(True)
     minIntensity = _bound("Min Intensity", 0.0)
@@ -335,9 +335,9 @@ class CloudDisplay(TopicDisplay):
 
     #: Number of points with a position.
     points = ReadOnly(int, 0)
-    #: The color transformer in use.
+    #: The colour transformer in use.
     usedColorTransformer = ReadOnly(str, "")
-    #: The color transformers that the last cloud allows.
+    #: The colour transformers that the last cloud allows.
     colorTransformers: ReadOnly[list[str]] = ReadOnly(cast("type[list[str]]", "QStringList"), [])
     #: The fields of the last cloud, for Channel Name.
     channels: ReadOnly[list[str]] = ReadOnly(cast("type[list[str]]", "QStringList"), [])
@@ -357,7 +357,7 @@ class CloudDisplay(TopicDisplay):
 
     @property
     def wanted_transformer(self) -> str:
-        """The color transformer that is chosen, or else in use; empty while there is none."""
+        """The colour transformer that is chosen, or else in use; empty while there is none."""
         return str(self.colorTransformer or self.usedColorTransformer)
 
     def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:

@@ -65,7 +65,7 @@ def _shape_settings() -> tuple[Setting, ...]:
     """Return the settings of a pose that is shown as an arrow or as axes."""
     return (
         Setting("Shape", "enum", "Arrow", "How a pose is drawn.", choices=["Arrow", "Axes"]),
-        Setting("Color", "color", "#ff1900", "Color of arrows.", shown_if=_ARROW),
+        Setting("Color", "color", "#ff1900", "Colour of arrows.", shown_if=_ARROW),
         Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0),
         _metres("Shaft Length", 1.0, _ARROW),
         _metres("Shaft Radius", 0.05, _ARROW),
@@ -156,7 +156,7 @@ class PoseArrayDisplay(TopicDisplay):
         "Shape", "enum", "Arrow (Flat)", "How poses are drawn.",
         choices=["Arrow (Flat)", "Arrow (3D)", "Axes"],
     )  # fmt: skip
-    color = Setting("Color", "color", "#ff1900", "Color of arrows.", shown_if=_ANY_ARROW)
+    color = Setting("Color", "color", "#ff1900", "Colour of arrows.", shown_if=_ANY_ARROW)
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     arrowLength = _metres("Arrow Length", 0.3, _FLAT_ARROW)
     headRadius = _metres("Head Radius", 0.03, _SOLID_ARROW)
@@ -266,7 +266,7 @@ class _WithCovariance(TopicDisplay):
         "Covariance/Position/Color",
         "color",
         "#cc33cc",
-        "Color of the ellipsoid.",
+        "Colour of the ellipsoid.",
         shown_if=_POSITION,
     )
     positionAlpha = Setting(
@@ -288,11 +288,11 @@ class _WithCovariance(TopicDisplay):
         choices=["Local", "Fixed"], shown_if=_ORIENTATION,
     )  # fmt: skip
     orientationColorStyle = Setting(
-        "Covariance/Orientation/Color Style", "enum", "Unique", "One color, or those of the axes.",
+        "Covariance/Orientation/Color Style", "enum", "Unique", "One colour, or those of the axes.",
         choices=["Unique", "RGB"], shown_if=_ORIENTATION,
     )  # fmt: skip
     orientationColor = Setting(
-        "Covariance/Orientation/Color", "color", "#ffff7f", "Color of the shapes.",
+        "Covariance/Orientation/Color", "color", "#ffff7f", "Colour of the shapes.",
         shown_if={**_ORIENTATION, "orientationColorStyle": "Unique"},
     )  # fmt: skip
     orientationAlpha = Setting(
@@ -542,7 +542,7 @@ class PathDisplay(HistoryDisplay):
         min=0.001,
         shown_if=_BILLBOARDS,
     )
-    color = Setting("Color", "color", "#19ff00", "Color of the line.")
+    color = Setting("Color", "color", "#19ff00", "Colour of the line.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     bufferLength = Setting(
         "Buffer Length", "int", 1, "Number of paths shown.", min=1, max=1000, then="_on_length"
@@ -553,7 +553,7 @@ class PathDisplay(HistoryDisplay):
     )
     axesLength = _metres("Length", 0.3, _POSE_AXES)
     axesRadius = _metres("Radius", 0.03, _POSE_AXES)
-    poseColor = Setting("Pose Color", "color", "#ff55ff", "Color of arrows.", shown_if=_POSE_ARROWS)
+    poseColor = Setting("Pose Color", "color", "#ff55ff", "Colour of arrows.", shown_if=_POSE_ARROWS)
     shaftLength = _metres("Shaft Length", 0.1, _POSE_ARROWS)
     headLength = _metres("Head Length", 0.2, _POSE_ARROWS)
     shaftDiameter = _metres("Shaft Diameter", 0.1, _POSE_ARROWS)

@@ -67,7 +67,7 @@ _PROGRESS_S = 0.1
 _RETRY_MS = 2000
 #: RViz's colour of what has no material.
 _NO_MATERIAL = (1.0, 0.0, 0.0, 1.0)
-#: Color of parts of mesh files without a color.
+#: Colour of parts of mesh files without a colour.
 _GREY = (0.6, 0.6, 0.6, 1.0)
 #: RViz's axes of a link: length and diameter, metres.
 _AXES_M, _AXES_WIDTH_M = 0.1, 0.01

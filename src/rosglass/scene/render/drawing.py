@@ -40,9 +40,9 @@ OPAQUE = 0.9998
 
 @dataclass(frozen=True, slots=True)
 class Coloring:
-    """The coloring of points in the shader.
+    """The colouring of points in the shader.
 
-    With the vertex's position and channel, the color is::
+    With the vertex's position and channel, the colour is::
 
         flat      first
         bgra      channel.bgr, with channel.a if per_point_alpha
@@ -59,8 +59,8 @@ class Coloring:
         low: Value at which the part is 0.
         high: Value at which the part is 1.
         invert: Whether the rainbow is red at `high`.
-        first: Color of flat points, or at `low`: red, green, blue from 0 to 1.
-        last: Color at `high`.
+        first: Colour of flat points, or at `low`: red, green, blue from 0 to 1.
+        last: Colour at `high`.
         axis: Factors of x, y, z of a point in its own frame, and of 1.
         per_point_alpha: Whether points are as transparent as their channel says.
     """

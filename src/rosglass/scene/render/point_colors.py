@@ -1,6 +1,6 @@
-"""The colors of point clouds, by RViz's names, defaults and rules.
+"""The colours of point clouds, by RViz's names, defaults and rules.
 
-Colors are parameters of a shader, so that no cloud is repacked for them;
+Colours are parameters of a shader, so that no cloud is repacked for them;
 :meth:`PointColors.of_points` computes the same with numpy.
 """
 
@@ -68,7 +68,7 @@ def rainbow(part: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class PointColors(Coloring):
-    """The colors of one cloud, as parameters of the shader, or computed here.
+    """The colours of one cloud, as parameters of the shader, or computed here.
 
     Attributes:
         channel: The vertex's channel; None if it needs none.
@@ -82,7 +82,7 @@ class PointColors(Coloring):
     warning: str = ""
 
     def of_points(self, cloud: Cloud) -> NDArray[np.uint8]:
-        """Return the color of each point, points x (red, green, blue, alpha)."""
+        """Return the colour of each point, points x (red, green, blue, alpha)."""
         out = np.full((cloud.point_count, 4), 255, np.uint8)
         if self.mode == "flat":
             out[:, :3] = to_unorm(np.array(self.first))
@@ -123,11 +123,11 @@ class ColorTransformer:
 
     @classmethod
     def supports(cls, layout: CloudLayout) -> bool:  # noqa: ARG003 - for subclasses
-        """Return whether it can color a cloud."""
+        """Return whether it can colour a cloud."""
         return True
 
     def colors(self, cloud: Cloud, transform: Array | None = None) -> PointColors:
-        """Return the colors of a cloud.
+        """Return the colours of a cloud.
 
         Args:
             cloud: A cloud that it supports.
@@ -138,22 +138,22 @@ class ColorTransformer:
 
 @dataclass(frozen=True, slots=True)
 class FlatColor(ColorTransformer):
-    """One color for all points.
+    """One colour for all points.
 
     Attributes:
-        color: The color; its alpha, if it has one, is not used.
+        color: The colour; its alpha, if it has one, is not used.
     """
 
     color: Color = _WHITE
 
     def colors(self, cloud: Cloud, transform: Array | None = None) -> PointColors:  # noqa: ARG002
-        """Return the colors of a cloud."""
+        """Return the colours of a cloud."""
         return PointColors("flat", first=_rgb(self.color))
 
 
 @dataclass(frozen=True, slots=True)
 class Rgb8(ColorTransformer):
-    """Colors of a packed field rgb, or rgba, whose alpha is used as well."""
+    """Colours of a packed field rgb, or rgba, whose alpha is used as well."""
 
     _is_grey: ClassVar[bool] = False
 
@@ -173,7 +173,7 @@ class Rgb8(ColorTransformer):
         return last
 
     def colors(self, cloud: Cloud, transform: Array | None = None) -> PointColors:  # noqa: ARG002
-        """Return the colors of a cloud."""
+        """Return the colours of a cloud."""
         field = self._field(cloud.layout)
         if field is None or not self.supports(cloud.layout):
             return _white("no field rgb or rgba of 4 bytes", cloud)
@@ -191,7 +191,7 @@ class Mono8(Rgb8):
 
 @dataclass(frozen=True, slots=True)
 class RgbF32(ColorTransformer):
-    """Colors of the fields r, g and b, float32 from 0 to 1."""
+    """Colours of the fields r, g and b, float32 from 0 to 1."""
 
     @classmethod
     def supports(cls, layout: CloudLayout) -> bool:
@@ -200,7 +200,7 @@ class RgbF32(ColorTransformer):
         return all(field is not None and field.datatype == FLOAT32 for field in fields)
 
     def colors(self, cloud: Cloud, transform: Array | None = None) -> PointColors:  # noqa: ARG002
-        """Return the colors of a cloud."""
+        """Return the colours of a cloud."""
         if not self.supports(cloud.layout):
             return _white("no fields r, g and b of float32", cloud)
         return PointColors("bgra", channel=Channel(("r", "g", "b"), is_color=True))
@@ -208,14 +208,14 @@ class RgbF32(ColorTransformer):
 
 @dataclass(frozen=True, slots=True)
 class Intensity(ColorTransformer):
-    """Colors by the value of a field; points stay white if the cloud does not have it.
+    """Colours by the value of a field; points stay white if the cloud does not have it.
 
     Attributes:
         channel_name: Name of the field.
-        use_rainbow: Whether to use the rainbow, from red at the minimum, or two colors.
+        use_rainbow: Whether to use the rainbow, from red at the minimum, or two colours.
         invert_rainbow: Whether the rainbow is red at the maximum.
-        min_color: Color at the minimum.
-        max_color: Color at the maximum.
+        min_color: Colour at the minimum.
+        max_color: Colour at the maximum.
         autocompute_intensity_bounds: Whether minimum and maximum are those of the cloud.
         min_intensity: Minimum otherwise.
         max_intensity: Maximum otherwise.
@@ -233,7 +233,7 @@ class Intensity(ColorTransformer):
     max_intensity: float = 4096.0
 
     def colors(self, cloud: Cloud, transform: Array | None = None) -> PointColors:  # noqa: ARG002
-        """Return the colors of a cloud."""
+        """Return the colours of a cloud."""
         field = cloud.layout.find_channel(self.channel_name)
         if field is None:
             return _white(f"no readable channel {shown(self.channel_name)}", cloud)
@@ -273,7 +273,7 @@ class AxisColor(ColorTransformer):
     use_fixed_frame: bool = True
 
     def colors(self, cloud: Cloud, transform: Array | None = None) -> PointColors:
-        """Return the colors of a cloud."""
+        """Return the colours of a cloud."""
         row = np.eye(4)["XYZ".index(self.axis)]
         if self.use_fixed_frame and transform is not None:
             row = transform["XYZ".index(self.axis)]
@@ -293,7 +293,7 @@ class AxisColor(ColorTransformer):
         )
 
 
-#: RViz's color transformers by name, sorted.
+#: RViz's colour transformers by name, sorted.
 COLOR_TRANSFORMERS: dict[str, type[ColorTransformer]] = {
     "AxisColor": AxisColor,
     "FlatColor": FlatColor,
@@ -305,14 +305,14 @@ COLOR_TRANSFORMERS: dict[str, type[ColorTransformer]] = {
 
 
 def supported_color_transformers(layout: CloudLayout) -> list[str]:
-    """Return the names of the color transformers that support a cloud, sorted."""
+    """Return the names of the colour transformers that support a cloud, sorted."""
     return [name for name, found in COLOR_TRANSFORMERS.items() if found.supports(layout)]
 
 
 def choose_color_transformer(layout: CloudLayout, current: str = "") -> str:
-    """Return the name of the color transformer to use: the current one if it supports the cloud.
+    """Return the name of the colour transformer to use: the current one if it supports the cloud.
 
-    Otherwise RViz's choice: RGB8 if the cloud has such colors, or the highest score.
+    Otherwise RViz's choice: RGB8 if the cloud has such colours, or the highest score.
     """
     names = supported_color_transformers(layout)
     if current in names:

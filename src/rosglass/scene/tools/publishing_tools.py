@@ -268,7 +268,7 @@ class PoseTool(PublishingTool):
     """
 
     _HELP = "Click and drag mouse to set position/orientation."
-    #: Color of the arrow.
+    #: Colour of the arrow.
     _COLOR: ClassVar[tuple[float, ...]] = (0.0, 1.0, 0.0, 1.0)
 
     #: A pose was set: x and y in metres, yaw in radians, in the fixed frame.
@@ -451,7 +451,7 @@ class SetGoalTool(PoseTool):
     def cancelGoal(self) -> None:
         """Request the action's server to cancel the last goal; the status bar says what came of it.
 
-        A goal that still waits for its server is not sent; the one before it is canceled as well.
+        A goal that still waits for its server is not sent; the one before it is cancelled as well.
         """
         goal, session = self._goal, self._session
         was_waiting = self.drop_waiting()

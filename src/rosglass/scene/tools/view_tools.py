@@ -199,7 +199,7 @@ class MeasureTool(Tool):
     #: A distance was measured: metres.
     measured = Signal(float)
 
-    color = Setting("Line color", "color", "#ffd500", "Color of the line.")
+    color = Setting("Line color", "color", "#ffd500", "Colour of the line.")
     #: Metres between the points; -1 before the second one.
     length = ReadOnly(float, -1.0)
 

@@ -81,7 +81,7 @@ class OrbitView(ViewController):
         ),
         "Left-Click: Move X/Y.  Right-Click/Mouse Wheel: Move Z.",
     )
-    #: Color of the focal shape, RGBA.
+    #: Colour of the focal shape, RGBA.
     _COLOR = (1.0, 1.0, 0.0, 0.5)
 
     distance = NumberSetting(
