@@ -42,7 +42,7 @@ def offer(robot, topic, wire, client):
     return offer
 
 
-def test_a_goal_succeeds_with_feedback_and_result(offer, client, console, wire, eventually):
+def test_goal_succeeds_with_feedback_and_result(offer, client, console, wire, eventually):
     server = offer()
     feedback, statuses, done = [], [], []
     goal = client.send_goal(
@@ -70,7 +70,7 @@ def test_a_goal_succeeds_with_feedback_and_result(offer, client, console, wire, 
     assert client.problem == server.problem == ""
 
 
-def test_a_rejected_goal_leaves_nothing_behind(offer, client, eventually):
+def test_rejected_goal_leaves_nothing_behind(offer, client, eventually):
     server = offer(accept=lambda goal: goal.order < 10)
     events = []
     goal = client.send_goal({"order": 100}, on_status_change=events.append, on_done=events.append)
@@ -86,7 +86,7 @@ def test_a_rejected_goal_leaves_nothing_behind(offer, client, eventually):
     assert client.send_goal({"order": 2}).result(30).status is GoalStatus.SUCCEEDED
 
 
-def test_a_goal_is_cancelled(offer, client):
+def test_goal_is_cancelled(offer, client):
     offer()
     goal = client.send_goal({"order": 1_000_000})
     assert goal.acceptance.result(30)
@@ -102,7 +102,7 @@ def test_all_goals_are_cancelled(offer, client):
     assert {goal.result(30).status for goal in goals} == {GoalStatus.CANCELED}
 
 
-def test_a_goal_waits_for_the_server(robot, client, topic, wire):
+def test_goal_waits_for_the_server(robot, client, topic, wire):
     goal = client.send_goal({"order": 3})
     robot.create_action_server(topic, wire.count, count)
     assert goal.result(30).status is GoalStatus.SUCCEEDED
@@ -153,7 +153,7 @@ def test_status_of_goals_is_available_to_late_subscriptions(offer, client, conne
         assert (bytes(entry.goal_info.goal_id.uuid), entry.status) == (goal.id, 4)
 
 
-def test_the_graph_shows_the_action(offer, console, topic, wire, eventually):
+def test_graph_shows_the_action(offer, console, topic, wire, eventually):
     offer()
     eventually(lambda: topic in console.actions(), console.actions)
     assert console.actions()[topic] == [wire.count]
@@ -182,7 +182,7 @@ def test_cancelling_one_all_and_before(offer, connect, client, topic):
     assert again == CancelAnswer((), "the goal has ended already: canceled")
 
 
-def test_a_goal_cancelled_before_it_was_sent_is_not_sent(offer, client, eventually):
+def test_goal_cancelled_before_it_was_sent_is_not_sent(offer, client, eventually):
     events, executed = [], []
     goal = client.send_goal(on_status_change=events.append, on_done=events.append)
     assert goal.cancel().result(30) == CancelAnswer((goal.id,))
@@ -364,7 +364,7 @@ class Failed(dict):
     __getitem__ = __iter__ = __len__ = keys = get = items
 
 
-def test_a_result_whose_own_code_fails_aborts_the_goal(offer, client, caplog):
+def test_result_whose_own_code_fails_aborts_the_goal(offer, client, caplog):
     done = Future()
     offer(lambda goal: Failed() if goal.goal.order == 1 else done)
     goals = [client.send_goal({"order": order}) for order in (1, 2)]
@@ -505,7 +505,7 @@ def test_goal_is_cancelled_unless_the_callback_refuses(offer, client, decision, 
     assert warning in caplog.text
 
 
-def test_a_goal_goes_on_when_the_user_refuses_to_cancel_it(offer, client, eventually):
+def test_goal_goes_on_when_the_user_refuses_to_cancel_it(offer, client, eventually):
     seen = []
 
     def refuse(goal):
@@ -522,7 +522,7 @@ def test_a_goal_goes_on_when_the_user_refuses_to_cancel_it(offer, client, eventu
     eventually(lambda: theirs.status is GoalStatus.EXECUTING)
 
 
-def test_a_stop_is_taken_although_the_executor_raises(offer, client, caplog, eventually):
+def test_cancel_request_is_accepted_although_the_executor_raises(offer, client, caplog, eventually):
     executor = Failing()
     server = offer(accept=lambda _: True, cancel=lambda _: False, executor=executor)
     goal = client.send_goal(ENDLESS)
@@ -539,7 +539,7 @@ def test_a_stop_is_taken_although_the_executor_raises(offer, client, caplog, eve
     assert "the executor of accept and cancel raised" in caplog.text
 
 
-def test_a_stop_is_taken_although_callbacks_hold_up_the_dispatcher(offer, robot, client):
+def test_cancel_request_is_accepted_although_callbacks_block_the_dispatcher(offer, robot, client):
     offer()
     goal = client.send_goal(ENDLESS)
     assert goal.acceptance.result(30)
@@ -550,7 +550,7 @@ def test_a_stop_is_taken_although_callbacks_hold_up_the_dispatcher(offer, robot,
     release.set()
 
 
-def test_a_goal_that_the_executor_does_not_take_is_aborted(offer, client, caplog):
+def test_goal_that_the_executor_rejects_is_aborted(offer, client, caplog):
     executor = Failing()
     executor.failing = True
     offer(executor=executor)
@@ -560,7 +560,7 @@ def test_a_goal_that_the_executor_does_not_take_is_aborted(offer, client, caplog
     assert "which cannot be executed: RuntimeError" in caplog.text
 
 
-def test_a_goal_whose_event_loop_is_closed_is_aborted(offer, client, caplog):
+def test_goal_whose_event_loop_is_closed_is_aborted(offer, client, caplog):
     loop = asyncio.new_event_loop()
     loop.close()
     offer(executor=LoopExecutor(loop))
@@ -568,7 +568,7 @@ def test_a_goal_whose_event_loop_is_closed_is_aborted(offer, client, caplog):
     assert "which cannot be executed: RuntimeError" in caplog.text
 
 
-def test_a_goal_cancelled_before_its_turn_is_not_started(offer, client):
+def test_goal_cancelled_before_its_turn_is_not_started(offer, client):
     turn, started, release = Dispatcher("turn"), [], threading.Event()
     turn.post(lambda: release.wait(30) and None)
     server = offer(started.append, executor=turn)
@@ -582,7 +582,7 @@ def test_a_goal_cancelled_before_its_turn_is_not_started(offer, client):
     turn.close()
 
 
-def test_a_future_lets_a_goal_go_on_without_a_thread(offer, client, eventually):
+def test_goal_with_a_future_needs_no_thread(offer, client, eventually):
     """A promise announces the cancel request, as user interfaces need it."""
     goals, asked, answers = [], [], [Future(), Future()]
 
@@ -690,7 +690,7 @@ def test_closing_from_execute_does_not_hang(offer, client, eventually):
     eventually(lambda: goal.status is GoalStatus.ABORTED)
 
 
-def test_a_goal_that_ignores_the_end_is_left_to_its_thread(offer, client, caplog, monkeypatch):
+def test_goal_that_ignores_closing_is_abandoned(offer, client, caplog, monkeypatch):
     monkeypatch.setattr("rosglass.comm.action_server._CLOSE_TIMEOUT_S", 0.2)
     started, release = threading.Event(), threading.Event()
 

@@ -76,7 +76,7 @@ def test_logging_never_raises(robot):
     robot.logger.info("after closing")
 
 
-def test_the_last_words_are_sent_before_closing_and_nothing_after(robot, log, eventually):
+def test_last_log_messages_are_sent_before_closing_and_none_after(robot, log, eventually):
     logger = robot.logger
     logger.info("last words")
     robot.close()
@@ -86,7 +86,7 @@ def test_the_last_words_are_sent_before_closing_and_nothing_after(robot, log, ev
     assert [message.msg for message in log()] == ["last words"]
 
 
-def test_a_flood_is_cut_and_counted(robot, log, eventually):
+def test_flood_of_log_messages_is_limited_and_counted(robot, log, eventually):
     robot.logger.propagate = False
     for number in range(5000):
         robot.logger.info("%d", number)
@@ -138,7 +138,7 @@ def simulate(wire, robot, console, eventually):
     simulate(False)
 
 
-def test_the_clock_follows_the_simulation(robot, console, simulate, eventually):
+def test_clock_follows_the_simulation(robot, console, simulate, eventually):
     jumps = []
     robot.clock.on_jump(jumps.append)
     assert not robot.clock.is_simulated
@@ -170,9 +170,7 @@ def test_the_clock_follows_the_simulation(robot, console, simulate, eventually):
     assert jumps[0].change is ClockChange.TO_SIMULATED
 
 
-def test_a_simulation_that_publishes_no_time_is_warned_of(
-    simulate, eventually, monkeypatch, caplog
-):
+def test_missing_clock_of_a_simulation_is_logged(simulate, eventually, monkeypatch, caplog):
     monkeypatch.setattr("rosglass.comm.builtin_services._FIRST_TIME_TIMEOUT_S", 0.1)
     simulate(True)
     eventually(lambda: "time stands still at zero" in caplog.text)

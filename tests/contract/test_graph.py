@@ -19,7 +19,7 @@ from rosglass.comm import IMMEDIATE, ConnectionState, GoalStatus
 TEXT = "std_msgs/msg/String"
 
 
-def test_a_node_is_connected_and_says_so(robot, console, eventually):
+def test_node_reports_that_it_is_connected(robot, console, eventually):
     assert robot.status().state is not ConnectionState.CLOSED
     eventually(lambda: console.status().state is ConnectionState.CONNECTED, console.status)
 
@@ -111,18 +111,18 @@ def test_changes_of_the_graph_are_merged_while_a_callback_waits_for_its_turn(
     assert calls == [1]
 
 
-def test_a_type_is_fetched_by_its_name(robot, console, topic, wire):
+def test_type_is_fetched_by_its_name(robot, console, topic, wire):
     robot.create_publisher(topic, TEXT, QoS.latched())
     assert console.fetch_type(TEXT, timeout=30).name == TEXT
 
 
-def test_a_near_name_is_offered_for_a_wrong_one(robot, console, topic, eventually):
+def test_similar_name_is_suggested(robot, console, topic, eventually):
     robot.create_publisher(topic + "_pose", TEXT)
     subscription = console.create_subscription(topic + "_posse", TEXT)
     eventually(lambda: topic + "_pose" in subscription.hint, lambda: subscription.hint)
 
 
-def test_a_closed_node_does_nothing_more(connect, topic):
+def test_use_of_a_closed_node(connect, topic):
     node = connect("gone")
     subscription = node.create_subscription(topic, TEXT)
     publisher = node.create_publisher(topic, TEXT)
@@ -239,7 +239,7 @@ def test_closed_endpoints_leave_nothing_behind(
     eventually(lambda: len(own_threads()) <= threads, own_threads)
 
 
-def test_the_log_goes_to_rosout(robot, console, wire, eventually):
+def test_log_goes_to_rosout(robot, console, wire, eventually):
     found = []
     console.create_subscription(
         "/rosout", None, lambda message: found.append((message.name, message.msg)), QoS(100)

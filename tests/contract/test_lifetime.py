@@ -20,7 +20,7 @@ TEXT, IMAGE = "std_msgs/msg/String", "sensor_msgs/msg/Image"
 KEEP_ALL = QoS(history=History.KEEP_ALL)
 
 
-def test_a_callback_in_the_receiving_thread_may_publish_create_and_close(
+def test_callback_in_the_receiving_thread_may_publish_create_and_close(
     robot, console, topic, eventually
 ):
     out = console.create_publisher(f"{topic}_out", TEXT)
@@ -46,9 +46,7 @@ def test_a_callback_in_the_receiving_thread_may_publish_create_and_close(
 
 
 @pytest.mark.parametrize("executor", [None, IMMEDIATE], ids=["own thread", "receiving thread"])
-def test_a_node_can_be_closed_in_its_own_callback(
-    wire, connect, robot, topic, eventually, executor
-):
+def test_node_can_be_closed_in_its_own_callback(wire, connect, robot, topic, eventually, executor):
     node = connect("closing")
     eventually(lambda: "/closing" in [found.full for found in robot.nodes()])
     done = threading.Event()
@@ -143,7 +141,7 @@ time.sleep(0.1)
 
 
 @pytest.mark.parametrize("end", ["", "raise KeyboardInterrupt"], ids=["at its end", "by Ctrl-C"])
-def test_a_program_ends_by_itself_without_closing_its_node(wire, end):
+def test_program_ends_by_itself_without_closing_its_node(wire, end):
     code, output = run(FORGETFUL.format(url=wire.url, text=TEXT, image=IMAGE) + end)
     if end:
         # Python forgets why it ends if another thread runs exec() at that time, as for dataclasses.

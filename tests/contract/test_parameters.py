@@ -41,7 +41,7 @@ class _Group:
 # -- our own -----------------------------------------------------------------------------------
 
 
-def test_a_declared_parameter_is_read_set_described_and_forgotten(own):
+def test_declared_parameter_is_read_set_described_and_forgotten(own):
     speed, gain = own.name("speed"), own.name("arm", "gain")
     parameters = own.all
     described = ParameterDescriptor(description="In m/s.")
@@ -135,7 +135,7 @@ async def _coroutine(_):
     """Would be called, and nothing in it would ever run."""
 
 
-def test_a_file_that_was_saved_is_loaded(own, tmp_path):
+def test_file_that_was_saved_is_loaded(own, tmp_path):
     names = {own.name("speed"): 1.5, own.name("arm", "list"): [1, 2], own.name("text"): "yes"}
     for name, value in names.items():
         own.all.declare(name, value)
@@ -191,7 +191,7 @@ def test_wrong_arguments_are_refused(client):
             client.watch(callback)
 
 
-def test_the_first_change_after_watching_begins_is_reported(
+def test_first_change_after_watching_begins_is_reported(
     own, client, wire, robot, console, eventually
 ):
     name, other, changes = own.name("speed"), own.name("other"), []

@@ -66,7 +66,7 @@ def test_incompatible_profiles_are_reported_to_both_sides(
     eventually(lambda: problems[-1:] == [""], lambda: problems)
 
 
-def test_a_publisher_names_subscriptions_of_other_types(robot, console, topic, eventually):
+def test_publisher_names_subscriptions_of_other_types(robot, console, topic, eventually):
     publisher = robot.create_publisher(topic, TEXT)
     console.create_subscription(topic, TWIST)
     reason = f"/console subscribes to {TWIST} here, not {TEXT}: it receives nothing"
@@ -199,7 +199,7 @@ def test_several_types_on_one_topic(robot, console, topic, eventually):
     eventually(lambda: unsure.problem == "")
 
 
-def test_a_relay_passes_on_a_type_that_it_does_not_know(connect, topic, eventually):
+def test_relay_passes_on_a_type_that_it_does_not_know(connect, topic, eventually):
     library = Library()
     library.add_text("secret_msgs/msg/Thing", "string text\nint32[] numbers\n")
     secret = rosglass.load("secret_msgs/msg/Thing", library=library)

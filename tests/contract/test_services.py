@@ -39,7 +39,7 @@ def offer(robot, topic, wire, client):
 
 
 @pytest.mark.parametrize("way", ["call", "call_async", "await"])
-def test_a_service_is_called_and_answered(offer, client, way, topic, wire):
+def test_service_is_called_and_answered(offer, client, way, topic, wire):
     server = offer()
     request = {"a": 1, "b": 2}
     if way == "call":
@@ -67,7 +67,7 @@ def test_names_are_resolved(connect, wire):
     assert arm.create_service_server("~/add", wire.add, add).name == "/left/arm/add"
 
 
-def test_the_end_of_a_call_is_reported_on_an_executor(offer, client, eventually):
+def test_end_of_a_call_is_reported_on_an_executor(offer, client, eventually):
     offer()
     seen = []
     call = client.call_async({"a": 1})
@@ -82,7 +82,7 @@ def test_the_end_of_a_call_is_reported_on_an_executor(offer, client, eventually)
         call.on_done(None)
 
 
-def test_a_message_is_a_request_too(offer, client, wire):
+def test_message_is_a_request_too(offer, client, wire):
     offer()
     ros = 1 if wire.is_ros1 else 2
     request = rosglass.load(wire.add, ros=ros).request.create(a=2, b=3)
@@ -90,7 +90,7 @@ def test_a_message_is_a_request_too(offer, client, wire):
     assert client.call(timeout=30).sum == 0
 
 
-def test_a_client_without_type_takes_the_servers(robot, console, topic, wire):
+def test_client_without_type_takes_the_servers(robot, console, topic, wire):
     client = console.create_service_client(topic)
     assert client.type is None
     assert "type not known yet" in repr(client)
@@ -109,7 +109,7 @@ def test_a_client_without_type_takes_the_servers(robot, console, topic, wire):
     assert console.create_service_client(topic).wait_for_server(30)
 
 
-def test_the_node_calls_its_own_service(robot, topic, wire, offer):
+def test_node_calls_its_own_service(robot, topic, wire, offer):
     offer()
     with robot.create_service_client(topic, wire.add) as client:
         assert client.wait_for_server(30), client.problem
@@ -126,7 +126,7 @@ def test_calls_wait_for_the_server_as_they_were_made(robot, client, topic, wire)
     assert [call.result(30).sum for call in calls] == [3, 3, 3]
 
 
-def test_a_blocking_call_waits_for_the_server_too(robot, client, topic, wire):
+def test_blocking_call_waits_for_the_server_too(robot, client, topic, wire):
     offer = lambda: robot.create_service_server(topic, wire.add, add)  # noqa: E731
     threading.Timer(0.05, offer).start()
     assert client.call({"a": 1, "b": 2}, timeout=30).sum == 3
@@ -141,14 +141,14 @@ def test_without_a_server_a_call_ends_after_its_time_and_names_the_service(clien
     assert client.pending == 0
 
 
-def test_a_missing_service_is_explained_with_similar_names(robot, client, topic, wire, eventually):
+def test_missing_service_is_explained_with_similar_names(robot, client, topic, wire, eventually):
     robot.create_service_server(f"/base{topic}", wire.add, add)
     eventually(lambda: f"did you mean /base{topic}?" in client.problem, lambda: client.problem)
     assert f"no server offers {topic} [{client.type.name}] on {wire.url}" in client.problem
 
 
 @pytest.mark.parametrize("way", ["call", "call_async"])
-def test_a_server_that_does_not_answer_is_given_up(offer, client, way):
+def test_call_of_a_silent_server_times_out(offer, client, way):
     answers: list[Future] = []
 
     def never(_):
@@ -207,7 +207,7 @@ def test_requests_come_in_the_order_of_the_calls(robot, ordered_client, topic, w
 
 
 @pytest.mark.parametrize("kept", [False, True], ids=["any connection", "one connection"])
-def test_a_server_that_ends_takes_its_calls_along_and_the_next_one_is_called(
+def test_calls_end_with_their_server_and_the_next_server_is_called(
     robot, client, ordered_client, topic, wire, kept, eventually, monkeypatch
 ):
     monkeypatch.setattr("rosglass.comm.service_client._GRACE_S", 0.1)  # 3 s, for a router's restart
@@ -314,7 +314,7 @@ def test_callbacks_that_cannot_run_are_refused_at_creation(
     robot.create_service_server(topic, wire.add, add)  # nothing is left of the others
 
 
-def test_a_response_is_a_message_a_dict_or_nothing(robot, console, topic, wire):
+def test_response_is_a_message_a_dict_or_nothing(robot, console, topic, wire):
     kind = rosglass.load(TRIGGER, ros=1 if wire.is_ros1 else 2)
     done = {"success": True, "message": "done"}
     for number, response in enumerate((kind.response.create(**done), done, None)):
@@ -325,7 +325,7 @@ def test_a_response_is_a_message_a_dict_or_nothing(robot, console, topic, wire):
 
 
 @pytest.mark.parametrize("end", ["result", "exception", "cancel", "misfit"])
-def test_a_response_may_come_later(offer, client, wire, eventually, end):
+def test_response_may_come_later(offer, client, wire, eventually, end):
     answers: list[Future] = []
 
     def later(_):
@@ -367,7 +367,7 @@ def refused(wire, reason):
             yield
 
 
-def test_a_callback_that_fails_ends_the_call_with_an_error(offer, client, wire, topic, caplog):
+def test_callback_that_fails_ends_the_call_with_an_error(offer, client, wire, topic, caplog):
     answers = iter([ValueError("of the user's"), {"sum": 1}])
 
     def fail(_):
@@ -421,7 +421,7 @@ def test_no_error_of_a_callback_or_response_leaves_the_client_waiting(
     assert reason in caplog.text
 
 
-def test_a_service_error_of_a_callback_refuses_the_request(offer, client, wire, caplog):
+def test_service_error_of_a_callback_refuses_the_request(offer, client, wire, caplog):
     def refuse(_):
         raise rosglass.ServiceError("not homed")
 
@@ -435,7 +435,7 @@ def test_a_service_error_of_a_callback_refuses_the_request(offer, client, wire, 
 @pytest.mark.parametrize(
     ("response", "reason"), [({"sum": "x"}, "sum: expected"), ({"total": 1}, "total"), (7, "7")]
 )
-def test_a_response_that_does_not_fit_is_logged(
+def test_response_that_does_not_fit_is_logged(
     robot, offer, client, wire, caplog, eventually, response, reason
 ):
     offer(lambda _: response)
@@ -449,14 +449,14 @@ def test_a_response_that_does_not_fit_is_logged(
     assert reason in caplog.text
 
 
-def test_a_plain_function_that_returns_a_coroutine_is_an_error(offer, client, wire, caplog):
+def test_plain_function_that_returns_a_coroutine_is_an_error(offer, client, wire, caplog):
     offer(lambda _: serve(None))
     with refused(wire, "must be an async def"):
         client.call(timeout=patience(wire))
     assert "must be an async def" in caplog.text
 
 
-def test_a_server_whose_executor_raises_fails_the_request(offer, client, wire, caplog):
+def test_server_whose_executor_raises_fails_the_request(offer, client, wire, caplog):
     broken = Failing()
     broken.failing = True
     offer(executor=broken)
@@ -475,7 +475,7 @@ def test_executors_of_servers(offer, client, eventually):
     assert call.result(30).sum == 1
 
 
-def test_a_slow_callback_holds_up_neither_other_services_nor_the_graph(
+def test_slow_callback_blocks_neither_other_services_nor_the_graph(
     robot, console, topic, wire, eventually
 ):
     begun, go = threading.Event(), threading.Event()
@@ -497,7 +497,7 @@ def test_a_slow_callback_holds_up_neither_other_services_nor_the_graph(
 # -- threads that may not wait -------------------------------------------------------------------
 
 
-def test_a_callback_that_would_wait_for_itself_is_refused(robot, console, topic, wire, eventually):
+def test_callback_that_would_wait_for_itself_is_refused(robot, console, topic, wire, eventually):
     client = robot.create_service_client(topic, wire.add)
     robot.create_service_server(topic, wire.add, add)
     assert client.wait_for_server(30), client.problem
@@ -515,7 +515,7 @@ def test_a_callback_that_would_wait_for_itself_is_refused(robot, console, topic,
     assert client.call({"a": 2}, timeout=30).sum == 2
 
 
-def test_an_event_loop_is_not_held_up_by_a_call_of_its_own_service(robot, topic, wire):
+def test_event_loop_is_not_blocked_by_a_call_of_its_own_service(robot, topic, wire):
     async def slowly(request):
         return {"sum": request.a}
 
@@ -529,7 +529,7 @@ def test_an_event_loop_is_not_held_up_by_a_call_of_its_own_service(robot, topic,
     assert asyncio.run(main()) == 1
 
 
-def test_a_callback_may_call_what_runs_elsewhere(robot, console, topic, wire):
+def test_callback_may_call_what_runs_elsewhere(robot, console, topic, wire):
     own = Dispatcher("own")
     client = robot.create_service_client(topic, wire.add)
     robot.create_service_server(topic, wire.add, add, executor=own)
@@ -541,7 +541,7 @@ def test_a_callback_may_call_what_runs_elsewhere(robot, console, topic, wire):
     own.close()
 
 
-def test_a_callback_of_a_client_may_call_and_wait(
+def test_callback_of_a_client_may_call_and_wait(
     robot, console, offer, client, topic, wire, eventually
 ):
     """The response does not need the thread that waits for it."""
@@ -555,7 +555,7 @@ def test_a_callback_of_a_client_may_call_and_wait(
     eventually(lambda: sums == [5], lambda: (sums, other.problem))
 
 
-def test_a_callback_in_the_receiving_thread_may_not_wait(offer, client, wire):
+def test_callback_in_the_receiving_thread_may_not_wait(offer, client, wire):
     if wire.name == "local":
         pytest.skip("no thread receives: the response comes in the one that the server answers in")
     # The response comes after the callback was added: else it runs in this thread, which may wait.
@@ -652,7 +652,7 @@ def test_closing_ends_waiting_for_the_server(client):
         client.wait_for_server()
 
 
-def test_a_cancelled_call_ends_at_once(client, offer):
+def test_cancelled_call_ends_at_once(client, offer):
     held = threading.Event()
     offer(lambda _: held.wait(30) and {})
     call = client.call_async({"a": 1})

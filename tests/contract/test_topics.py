@@ -132,7 +132,7 @@ def test_only_bytes_and_samples_are_sent_as_they_are(robot, topic, data):
         publisher.publish_serialized(data)
 
 
-def test_a_buffer_may_be_reused_as_soon_as_it_is_sent(link, wire):
+def test_buffer_may_be_reused_as_soon_as_it_is_sent(link, wire):
     publisher, subscription = link()
     buffer = bytearray(publisher.type.encode({"data": "first"}, wire=publisher_wire(wire)))
     publisher.publish_serialized(memoryview(buffer))
@@ -140,7 +140,7 @@ def test_a_buffer_may_be_reused_as_soon_as_it_is_sent(link, wire):
     assert subscription.wait(30).message().data == "first"
 
 
-def test_a_sample_of_another_type_is_not_passed_on(link, robot, topic):
+def test_sample_of_another_type_is_not_passed_on(link, robot, topic):
     publisher, subscription = link()
     publisher.publish(data="x")
     sample = subscription.wait(30)
@@ -168,7 +168,7 @@ def test_closed_publisher_raises(link, eventually):
     eventually(lambda: subscription.publisher_count() == 0)
 
 
-def test_a_subscription_without_type_takes_the_publishers(link, eventually):
+def test_subscription_without_type_takes_the_publishers(link, eventually):
     received = []
     publisher, subscription = link(None, received.append)
     publisher.publish(data="hello")
@@ -177,9 +177,7 @@ def test_a_subscription_without_type_takes_the_publishers(link, eventually):
     assert received[0].data == "hello"
 
 
-def test_a_subscription_without_type_waits_for_the_first_publisher(
-    robot, console, topic, eventually
-):
+def test_subscription_without_type_waits_for_the_first_publisher(robot, console, topic, eventually):
     subscription = console.create_subscription(topic)
     assert subscription.type is None
     assert "has no publisher" in eventually(lambda: subscription.hint)
@@ -208,7 +206,7 @@ def test_big_messages_come_whole(link):
     assert bytes(message.data) == data
 
 
-def test_a_raw_callback_gets_bytes_and_stamps(link, eventually, wire):
+def test_raw_callback_gets_bytes_and_stamps(link, eventually, wire):
     received = []
     publisher, _ = link(raw_callback=received.append)
     publisher.publish(data="x")
@@ -228,7 +226,7 @@ def test_callbacks_run_where_they_are_asked_to(link, eventually):
     assert threads == ["console callbacks"]
 
 
-def test_a_callback_that_fails_ends_nothing(link, eventually, caplog):
+def test_failing_callback_does_not_end_the_subscription(link, eventually, caplog):
     received = []
 
     def fail(message):
@@ -260,7 +258,7 @@ def test_messages_are_taken_one_by_one_or_the_latest(link, eventually):
     assert subscription.statistics().dropped == 6
 
 
-def test_an_event_loop_is_woken_once_for_what_it_takes(link, eventually):
+def test_waiter_is_called_once(link, eventually):
     publisher, subscription = link(qos=5)
     woken = []
     assert subscription.add_waiter(lambda: woken.append(subscription.take().message().data))
@@ -354,7 +352,7 @@ def test_publishers_that_come_and_go_are_reported(connect, robot, console, topic
     assert subscription.publisher_count() == 0
 
 
-def test_a_publisher_reports_subscriptions_that_come_and_go(robot, console, topic, eventually):
+def test_publisher_reports_matched_and_unmatched_subscriptions(robot, console, topic, eventually):
     publisher = robot.create_publisher(topic, TEXT)
     events, before = [], console.create_subscription(topic, TEXT)
     eventually(lambda: [end.node for end in robot.subscriptions(topic)] == [name_of(console)])
@@ -381,7 +379,7 @@ def name_of(node):
     return NodeName(node.namespace, node.name)
 
 
-def test_a_publisher_without_subscriptions_hints_at_a_name_that_is_alike(
+def test_publisher_without_subscriptions_hints_at_a_name_that_is_alike(
     robot, console, topic, eventually
 ):
     console.create_subscription(f"{topic}/cmd_vel", TEXT)
@@ -411,7 +409,7 @@ def miss_deadlines(robot, topic, eventually):
     return miss_deadlines
 
 
-def test_a_publisher_that_pauses_misses_its_deadline(robot, topic, eventually, miss_deadlines):
+def test_publisher_that_pauses_misses_its_deadline(robot, topic, eventually, miss_deadlines):
     profile = QoS(deadline=Duration.from_seconds(0.05))
     publisher = robot.create_publisher(topic, TEXT, profile)
     events = []
@@ -453,7 +451,7 @@ def hold(topic, eventually):
 
 
 @pytest.mark.parametrize("brief", ["publisher", "subscription"])
-def test_an_endpoint_that_comes_and_goes_between_two_looks_is_reported(
+def test_endpoint_that_appears_and_leaves_between_two_polls_is_reported(
     robot, console, topic, eventually, hold, brief
 ):
     if brief == "publisher":
@@ -474,7 +472,7 @@ def test_an_endpoint_that_comes_and_goes_between_two_looks_is_reported(
     eventually(lambda: events[2:] == [(1, 1, 2)], lambda: events)
 
 
-def test_a_publisher_is_alive_while_it_is_there(robot, console, topic, eventually):
+def test_publisher_is_alive_while_it_is_in_the_graph(robot, console, topic, eventually):
     events = []
     subscription = console.create_subscription(topic, TEXT)
     subscription.on_liveliness_change(lambda e: events.append((e.change, e.alive, e.not_alive)))
@@ -484,7 +482,7 @@ def test_a_publisher_is_alive_while_it_is_there(robot, console, topic, eventuall
     eventually(lambda: events[1:] == [(-1, 0, 0)], lambda: events)
 
 
-def test_a_deadline_that_passes_without_message_is_reported(
+def test_deadline_that_passes_without_message_is_reported(
     robot, console, topic, eventually, miss_deadlines
 ):
     qos = QoS(deadline=Duration.from_seconds(0.2))
@@ -505,7 +503,7 @@ def test_a_deadline_that_passes_without_message_is_reported(
     assert len(events) == count, "without publisher, nothing is missed"
 
 
-def test_a_subscription_says_which_publisher_left(robot, console, topic, eventually, caplog):
+def test_subscription_reports_which_publisher_left(robot, console, topic, eventually, caplog):
     subscription = console.create_subscription(topic, TEXT)
     problems = []
     subscription.on_problem_change(problems.append)
@@ -523,7 +521,7 @@ def test_a_subscription_says_which_publisher_left(robot, console, topic, eventua
     eventually(lambda: problems[-2:] == [problem.group(), ""], lambda: problems)
 
 
-def test_a_publisher_of_ones_own_is_not_missed(robot, topic, eventually):
+def test_own_publisher_that_closed_is_not_reported(robot, topic, eventually):
     subscription = robot.create_subscription(topic, TEXT)
     counts = []
     subscription.on_matched(lambda event: counts.append(event.count))

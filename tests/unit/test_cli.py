@@ -181,7 +181,7 @@ def test_ros_args_and_the_arguments_of_others_are_set_apart(
     assert _split(line.split()) == (ours.split(), ros_args.split(), rest.split())
 
 
-def test_bad_ros_args_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_ros_args_are_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["robot", "--url", "zenoh://127.0.0.1:9", "--ros-args", "-r", "a"]) == 1
     assert "rosglass: --ros-args, argument 3: 'a' has no ':='" in capsys.readouterr().err
 
@@ -217,7 +217,7 @@ def test_negative_values_are_values() -> None:
     assert args.value == "-5"
 
 
-def test_a_graph_in_this_process(capsys: pytest.CaptureFixture[str]) -> None:
+def test_graph_in_this_process(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["topic", "list", "--url", "local://cli"]) == 0
     assert "there are no topics" in capsys.readouterr().err
     assert main(["node", "info", "/arm", "--url", "local://cli"]) == 1

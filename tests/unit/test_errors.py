@@ -41,7 +41,7 @@ def test_long_lines_and_errors_about_errors() -> None:
     assert rosglass.ServiceError(1, "two").args == (1, "two")
 
 
-def test_an_argument_of_any_size() -> None:
+def test_argument_of_any_size() -> None:
     with pytest.raises(rosglass.Error) as caught:
         rosglass.load(LONG)
     assert len(str(caught.value)) < 1000

@@ -48,19 +48,19 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> Iterator[Installed]:
         ([], f"{ROOT}[zenoh]"),
     ],
 )
-def test_the_command_names_the_origin(installed: Installed, record: Any, requirement: str) -> None:
+def test_command_names_the_origin(installed: Installed, record: Any, requirement: str) -> None:
     if record is not None:
         installed.record = record if isinstance(record, str) else json.dumps(record)
     assert install_command("zenoh") == f'pip install "{requirement}"'
 
 
-def test_the_command_of_this_installation_names_a_folder_that_pip_can_build() -> None:
+def test_command_of_this_installation_names_a_folder_that_pip_can_build() -> None:
     command = re.fullmatch(r'pip install "(.*)\[completion\]"', install_command("completion"))
     assert command is not None
     assert (Path(command[1]) / "pyproject.toml").is_file()
 
 
-def test_an_unknown_module_has_no_extra() -> None:
+def test_unknown_module_has_no_extra() -> None:
     assert explain_missing(ModuleNotFoundError("x", name="left_pad")) == ""
     assert install_command("zenoh") in explain_missing(ModuleNotFoundError("x", name="zenoh"))
 

@@ -101,7 +101,7 @@ def test_imports_between_rooms_point_one_way(package: str) -> None:
 
 
 @pytest.mark.parametrize("package", ROOMS)
-def test_a_package_with_rooms_has_few_modules_outside_them(package: str) -> None:
+def test_package_with_rooms_has_few_modules_outside_them(package: str) -> None:
     assert len(list((ROOT / package).glob("*.py"))) <= 4
 
 
@@ -128,7 +128,7 @@ def test_modules_import_each_other_in_two_pairs_at_most(milestones: Any) -> None
     assert milestones.circles(graph) <= 2
 
 
-def test_the_map_shows_the_folders_of_the_source_tree() -> None:
+def test_map_shows_the_folders_of_the_source_tree() -> None:
     page = Path(__file__).parents[2] / "docs" / "architecture.md"
     shown = page.read_text(encoding="utf-8").split("src/rosglass/\n")[1].split("tests/\n")[0]
     folders = {folder for folder in RANK if (ROOT / folder).is_dir()}
@@ -148,7 +148,7 @@ def run(code: str) -> str:
     return done.stdout.strip()
 
 
-def test_the_3d_view_loads_nothing_of_rviz() -> None:
+def test_3d_view_loads_nothing_of_rviz() -> None:
     pytest.importorskip("PySide6")
     loaded = run(
         "import rosglass.scene, sys\n"

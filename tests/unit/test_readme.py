@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def test_the_interface_shown_is_the_example() -> None:
+def test_interface_shown_is_the_example() -> None:
     shown = re.search(r"```qml\n(.*?)```", README, re.DOTALL)
     example = (ROOT / "examples/remote_control.qml").read_text(encoding="utf-8")
     assert shown is not None

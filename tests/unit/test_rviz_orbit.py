@@ -28,7 +28,7 @@ def test_straight_down_keeps_the_yaw_it_is_given() -> None:
     assert (orbit.yaw, orbit.pitch, orbit.distance) == (0.7, STEEPEST, 9)
 
 
-def test_the_yaw_is_where_the_camera_is() -> None:
+def test_yaw_is_where_the_camera_is() -> None:
     assert Orbit.between(Point(0, 5, 0), Point(0, 0, 0)).yaw == pytest.approx(math.pi / 2)
 
 

@@ -41,7 +41,7 @@ def painted(rects: list[Rect], width: int, height: int) -> NDArray[np.int64]:
     return times
 
 
-def test_a_tile_is_covered_by_one_pixel_and_by_colours_without_alpha() -> None:
+def test_one_opaque_pixel_covers_a_tile() -> None:
     pixels = picture(50, 40)
     pixels[39, 49] = 0x000001
     covered = covered_tiles(pixels)
@@ -69,7 +69,7 @@ def test_only_where_it_may_differ_a_frame_is_compared() -> None:
     assert not changed_tiles(now, before, []).any()
 
 
-def test_a_panel_is_one_rectangle_cut_at_the_edge() -> None:
+def test_panel_is_one_rectangle_cut_at_the_edge() -> None:
     pixels = picture(100, 70, (32, 48, 100, 70))
     assert cover(covered_tiles(pixels), 100, 70) == [(32, 48, 100, 70)]
     assert cover(covered_tiles(picture(100, 70)), 100, 70) == []

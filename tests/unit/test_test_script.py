@@ -25,7 +25,7 @@ def close(*rows: tuple[str, str, str, str], seconds: int = 100) -> tuple[int, li
     return done.returncode, done.stdout.splitlines()
 
 
-def test_the_last_line_is_pytests_closing_line_for_all_groups() -> None:
+def test_last_line_is_pytests_closing_line_for_all_groups() -> None:
     code, lines = close(
         ("2", "0", "lint", "All checks passed!"),
         ("167", "0", "units", "11336 passed, 1 skipped, 6 warnings in 167.41s (0:02:47)"),
@@ -58,7 +58,7 @@ def test_the_last_line_is_pytests_closing_line_for_all_groups() -> None:
         ("3", "7 passed in 1.00s", "10 passed, 1 error in 9.00s"),
     ],
 )  # fmt: skip
-def test_a_group_that_failed_fails_all(code: str, last: str, closing: str) -> None:
+def test_group_that_failed_fails_all(code: str, last: str, closing: str) -> None:
     exit_code, lines = close(
         ("1", code, "first", last), ("1", "0", "second", "3 passed in 1.00s"), seconds=9
     )
@@ -109,7 +109,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Checkout:
     return Checkout(tmp_path)
 
 
-def test_a_branch_is_compared_with_where_it_left_main(checkout: Checkout) -> None:
+def test_branch_is_compared_with_where_it_left_main(checkout: Checkout) -> None:
     checkout.commit("other")
     assert checkout.is_unchanged()
     (checkout.clone / "counts").write_text("not committed")
@@ -120,13 +120,13 @@ def test_a_branch_is_compared_with_where_it_left_main(checkout: Checkout) -> Non
     assert not checkout.is_unchanged("no-such-commit")
 
 
-def test_a_new_file_is_a_change(checkout: Checkout) -> None:
+def test_new_file_is_a_change(checkout: Checkout) -> None:
     checkout.commit("other")
     checkout.git("rm", "-q", "--cached", "counts")
     assert not checkout.is_unchanged()
 
 
-def test_a_tip_of_main_is_compared_where_it_is_a_merge(checkout: Checkout) -> None:
+def test_tip_of_main_is_compared_where_it_is_a_merge(checkout: Checkout) -> None:
     assert not checkout.is_unchanged(), "which commits were pushed together is not known"
     checkout.git("checkout", "-q", "-b", "branch")
     checkout.commit("other")

@@ -23,7 +23,7 @@ def test_it_fails_with_the_condition_its_value_and_what_it_looked_at() -> None:
         assert part in said
 
 
-def test_condition_without_source_is_named() -> None:
+def test_condition_without_source_is_reported() -> None:
     with pytest.raises(AssertionError, match=r"<built-in method .*>\n  is \{\}"):
         eventually({}.copy, timeout=0)
 

@@ -52,7 +52,7 @@ def texts(bag: Any, *args: Any, **options: Any) -> list[str]:
     return found
 
 
-def test_an_mcap_file_with_its_qos_in_words_or_numbers(tmp_path):
+def test_mcap_file_with_qos_as_text_or_numbers(tmp_path):
     words = "- {reliability: best_effort, durability: transient_local, depth: 3, history: 1}"
     with open_bag(write_mcap(tmp_path / "a.mcap", offered_qos_profiles=words)) as bag:
         (channel,) = bag.channels
@@ -70,7 +70,7 @@ def test_an_mcap_file_with_its_qos_in_words_or_numbers(tmp_path):
 
 
 @pytest.mark.parametrize("cut", [0, 60, 400])
-def test_a_recording_cut_short_plays_what_it_holds(tmp_path, caplog, cut):
+def test_recording_cut_short_plays_what_it_holds(tmp_path, caplog, cut):
     path = write_mcap(tmp_path / "a.mcap", 50, finish=False)
     data = path.read_bytes()
     path.write_bytes(data[: len(data) - cut])
@@ -116,7 +116,7 @@ def test_foreign_topics_are_left_out_and_named(tmp_path):
 
 
 @pytest.mark.parametrize("encoding", ["", "unknown"])
-def test_a_type_without_definition_is_opaque(tmp_path, encoding):
+def test_type_without_definition_is_opaque(tmp_path, encoding):
     path = tmp_path / "a.mcap"
     writer = mcap_writer.Writer(str(path))
     writer.start("ros2")
@@ -130,7 +130,7 @@ def test_a_type_without_definition_is_opaque(tmp_path, encoding):
         assert "no definition" in found.reason
 
 
-def test_a_ros2_bag_in_sqlite(tmp_path):
+def test_ros2_bag_in_sqlite(tmp_path):
     store = get_typestore(Stores.ROS2_JAZZY)
     kind = store.types[STRING]
     with Writer2(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
@@ -145,7 +145,7 @@ def test_a_ros2_bag_in_sqlite(tmp_path):
         assert bag.channels[0].type().rihs01 == load(STRING).rihs01
 
 
-def test_a_ros1_bag_translated(tmp_path):
+def test_ros1_bag_translated(tmp_path):
     store = get_typestore(Stores.ROS1_NOETIC)
     header = store.types["std_msgs/msg/Header"]
     stamp = store.types["builtin_interfaces/msg/Time"](12, 345)
@@ -169,7 +169,7 @@ def test_a_ros1_bag_translated(tmp_path):
     assert list(found.k) == list(range(9))
 
 
-def test_a_ros1_type_of_ones_own_is_translated_by_its_definition():
+def test_own_ros_1_type_is_translated_by_its_definition():
     text = """
 byte LOW=-3
 Header header
@@ -227,13 +227,13 @@ def test_names_that_differ_only_in_case_are_refused():
         Translation(MessageType.from_text("m/msg/X", "int8 a\nint8 A\n", ros=1))
 
 
-def test_an_mcap_file_is_known_by_its_beginning(tmp_path):
+def test_mcap_file_is_recognized_by_its_magic(tmp_path):
     path = write_mcap(tmp_path / "a.mcap").rename(tmp_path / "drive")
     with open_bag(path) as bag:
         assert len(texts(bag)) == 5
 
 
-def test_the_end_of_a_file_of_zeros_is_named_in_words(tmp_path):
+def test_end_of_a_file_of_zeros_is_reported_in_words(tmp_path):
     path = write_mcap(tmp_path / "a.mcap", 50, finish=False)
     path.write_bytes(path.read_bytes() + bytes(100))
     with open_bag(path) as bag:

@@ -201,7 +201,7 @@ def test_chunks_of_an_mcap_file_that_expand_too_far_are_left_out(bomb, tmp_path)
         assert f"at byte {offset}: " in problem
 
 
-def test_the_size_that_is_declared_is_named(tmp_path, caplog):
+def test_declared_size_is_reported(tmp_path, caplog):
     chunks = [good_chunk(0), ("zstd", b"", CHUNK_LIMIT + 1, 10), good_chunk(20)]
     offset = write_mcap(tmp_path / "a.mcap", chunks, True)
     with open_bag(tmp_path / "a.mcap") as bag:
@@ -227,7 +227,7 @@ def test_messages_beyond_counting_in_a_chunk_are_read_within_the_memory(tmp_path
         assert times == sorted(times)
 
 
-def test_a_chunk_that_the_index_names_often_is_read_once(tmp_path):
+def test_chunk_that_the_index_names_often_is_read_once(tmp_path):
     path = tmp_path / "a.mcap"
     write_mcap(path, [good_chunk(0), good_chunk(10), good_chunk(20)], True)
     data = path.read_bytes()
@@ -277,7 +277,7 @@ def test_chunks_of_a_cut_ros1_bag_that_expand_too_far_are_left_out(compression, 
 
 
 @pytest.mark.parametrize("compression", ["bz2", "lz4"])
-def test_a_ros1_bag_with_an_index_is_refused_where_it_expands_too_far(compression, tmp_path):
+def test_ros1_bag_with_an_index_is_refused_where_it_expands_too_far(compression, tmp_path):
     path = tmp_path / "a.bag"
     kinds = get_typestore(Stores.ROS1_NOETIC)
     writer = Ros1Writer(path)
@@ -352,7 +352,7 @@ def small_disk(tmp_path, monkeypatch):
     return place
 
 
-def test_a_bag_that_is_compressed_as_a_whole_is_read(small_disk, tmp_path):
+def test_bag_that_is_compressed_as_a_whole_is_read(small_disk, tmp_path):
     packed_bag(tmp_path / "bag", lambda file: zstandard.compress(file.read_bytes()))
     with open_bag(tmp_path / "bag") as bag:
         assert len(list(bag.messages())) == MESSAGES
@@ -361,7 +361,7 @@ def test_a_bag_that_is_compressed_as_a_whole_is_read(small_disk, tmp_path):
 
 
 @pytest.mark.parametrize("bomb", [zstd_bomb, sized_zstd_bomb])
-def test_a_bag_that_is_compressed_as_a_whole_does_not_fill_the_disk(bomb, small_disk, tmp_path):
+def test_bag_that_is_compressed_as_a_whole_does_not_fill_the_disk(bomb, small_disk, tmp_path):
     file = packed_bag(tmp_path / "bag", lambda _: bomb(256 * 2**20))
     with pytest.raises(BagError) as caught:
         open_bag(tmp_path / "bag")
@@ -387,7 +387,7 @@ def test_profiles_in_a_compressed_database_that_stand_for_too_much_are_refused(t
 
 
 @pytest.mark.parametrize("bomb", ["zstd that says so", "zstd that lies", "lz4 that lies"])
-def test_an_mcap_file_in_a_folder_is_refused_where_it_expands_too_far(bomb, tmp_path):
+def test_mcap_file_in_a_folder_is_refused_where_it_expands_too_far(bomb, tmp_path):
     folder = tmp_path / "bag"
     kinds = get_typestore(Stores.ROS2_HUMBLE)
     with Ros2Writer(folder, version=8, storage_plugin=StoragePlugin.MCAP) as writer:

@@ -103,7 +103,7 @@ def record(path: Path, library: Library, name: str, fields: dict[str, Any]) -> M
     ("name", "fields"),
     [("lab_msgs/msg/Winch", VALUES), ("lab_msgs/msg/Winches", {"all": [VALUES, {}]})],
 )
-def test_an_idl_type_is_recorded_as_msg_which_all_read(tmp_path, library, name, fields):
+def test_idl_type_is_recorded_as_msg_which_all_read(tmp_path, library, name, fields):
     path = tmp_path / "lab.mcap"
     recorded = record(path, library, name, fields)
     wanted = recorded.create(fields)
@@ -156,7 +156,7 @@ def test_idl_only_type_is_recorded_as_idl(tmp_path, library):
     assert (other.winch.stamp.sec, other.drumSpeed, list(other.turns)) == (7, 2.5, [1, 2])
 
 
-def test_a_recording_with_idl_types_is_played(tmp_path, library):
+def test_recording_with_idl_types_is_played(tmp_path, library):
     record(tmp_path / "lab.mcap", library, "lab_msgs/msg/Drum", {"drumSpeed": 2.5})
     found: list[float] = []
     with (
@@ -178,7 +178,7 @@ def idl_schema(name: str = "lab_msgs/msg/Winch") -> str:
     return f"{LINE}\nIDL: {name}\n{WINCH}{LINE}\nIDL: builtin_interfaces/msg/Time\n{time}"
 
 
-def test_an_mcap_file_with_an_idl_schema(tmp_path):
+def test_mcap_file_with_an_idl_schema(tmp_path):
     name, path = "lab_msgs/msg/Winch", tmp_path / "idl.mcap"
     kind = MessageType.from_text(name, idl_schema(), encoding="idl")
     writer = mcap_writer.Writer(str(path))
@@ -196,7 +196,7 @@ def test_an_mcap_file_with_an_idl_schema(tmp_path):
 
 @pytest.mark.parametrize("storage", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
 @pytest.mark.parametrize("broken", [False, True])
-def test_a_ros2_bag_with_an_idl_type(tmp_path, storage, broken):
+def test_ros2_bag_with_an_idl_type(tmp_path, storage, broken):
     """A definition that the rosbags package cannot read costs its own topic at most."""
     store, name = get_typestore(Stores.ROS2_JAZZY), "lab_msgs/msg/Winch"
     kind = MessageType.from_text(name, idl_schema(), encoding="idl")
@@ -222,7 +222,7 @@ def test_a_ros2_bag_with_an_idl_type(tmp_path, storage, broken):
 
 @pytest.mark.parametrize("storage", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
 @pytest.mark.parametrize("encoding", ["unknown", "ros3idl"])
-def test_a_ros2_bag_with_a_definition_in_another_language(tmp_path, storage, encoding):
+def test_ros2_bag_with_a_definition_in_another_language(tmp_path, storage, encoding):
     """As rosbag2 writes it for a type whose definition it does not find."""
     store = get_typestore(Stores.ROS2_JAZZY)
     string, number = load("std_msgs/msg/String"), load("std_msgs/msg/Int8")
@@ -287,7 +287,7 @@ def test_idl_has_no_infinity():
     assert [f.default for f in again.fields] == [None, None, "inf"]
 
 
-def test_a_schema_of_many_files_is_read_within_limits():
+def test_schema_of_many_files_is_limited():
     struct = "module lab_msgs { module msg { struct T# { long x; }; }; };"
     one = f"{LINE}\nIDL: lab_msgs/msg/T#\n{struct}\n"
     text = "".join(one.replace("#", str(number)) for number in range(5000))
@@ -299,7 +299,7 @@ def test_a_schema_of_many_files_is_read_within_limits():
         MessageType.from_text("lab_msgs/msg/T1", one + "oops", encoding="idl")
 
 
-def test_a_ros1_type_has_no_idl():
+def test_ros1_type_has_no_idl():
     with pytest.raises(rosglass.Error, match="'idl' in ROS 2"):
         MessageType.from_text("lab_msgs/msg/Winch", WINCH, 1, encoding="idl")
     assert schema_text(load("std_msgs/String", ros=1).definition) == ("msg", "string data")

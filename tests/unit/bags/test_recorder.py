@@ -14,7 +14,7 @@ from rosglass.bags.mcap_file import McapFile
 
 
 @pytest.mark.parametrize("full", ["message", "end"])
-def test_a_disk_that_is_full_when_the_file_is_closed(tmp_path, monkeypatch, full):
+def test_disk_that_is_full_when_the_file_is_closed(tmp_path, monkeypatch, full):
     """Closing writes the file's buffer, again after a failed write."""
     crashes = []
     monkeypatch.setattr(threading, "excepthook", crashes.append)

@@ -117,7 +117,7 @@ def test_time_is_the_recordings(drive, play):
         assert (received - START) % (SECOND // 10) == 0
 
 
-def test_a_recorded_clock_is_the_time(tmp_path, play):
+def test_recorded_clock_is_used(tmp_path, play):
     node = play(write(tmp_path / "sim.mcap", clock=True), "?rate=5")
     eventually(lambda: node.now() >= Time(60 * SECOND))
     assert node.now() <= Time(70 * SECOND)
@@ -179,7 +179,7 @@ def test_playing_again_from_the_end_and_looping(drive, play):
     ],
     ids=["one message", "one early", "faster", "none but a latched one", "part"],
 )
-def test_a_lap_lasts_as_long_as_what_was_selected(tmp_path, play, seconds, topics, options, lap):
+def test_lap_lasts_as_long_as_what_was_selected(tmp_path, play, seconds, topics, options, lap):
     path = write(tmp_path / "short.mcap", seconds)
     node, begun = play(path, "?paused=true"), time.monotonic()
     with (
@@ -209,7 +209,7 @@ def test_publishing_to_a_recording_is_a_problem(drive, play):
         node.create_service_client("/reset", "std_srvs/srv/Trigger")
 
 
-def test_the_graph_is_the_recordings(drive, play):
+def test_graph_is_that_of_the_recording(drive, play):
     node = play(drive, "?paused=true")
     assert node.topics()["/chatter"] == [STRING]
     assert [p.node.full for p in node.publishers("/chatter")] == ["/recording"]
@@ -235,7 +235,7 @@ def test_some_topics_only(drive, play):
     eventually(lambda: chatter == ["5"])
 
 
-def test_a_topic_that_was_left_out_is_received_as_soon_as_it_is_chosen(drive, play):
+def test_topic_that_was_left_out_is_received_as_soon_as_it_is_chosen(drive, play):
     # Not first when the node looks at the graph: what a paused recording sends comes once.
     node = play(drive, "?paused=true")
     node.choose(["plan"])
@@ -254,7 +254,7 @@ def test_other_type_than_recorded_is_a_problem(drive, play):
     assert "chatter" in node.create_subscription("/chater").hint
 
 
-def test_a_ros_1_recording(tmp_path, play):
+def test_ros_1_recording(tmp_path, play):
     store = get_typestore(Stores.ROS1_NOETIC)
     kind = store.types[STRING]
     path = tmp_path / "old.bag"
@@ -271,7 +271,7 @@ def test_a_ros_1_recording(tmp_path, play):
     assert node.now() >= Time(START)
 
 
-def test_a_ros_1_recording_sends_what_is_latched_to_every_subscriber(tmp_path, play):
+def test_ros_1_recording_sends_what_is_latched_to_every_subscriber(tmp_path, play):
     store = get_typestore(Stores.ROS1_NOETIC)
     kind = store.types[STRING]
     path = tmp_path / "latched.bag"
@@ -288,7 +288,7 @@ def test_a_ros_1_recording_sends_what_is_latched_to_every_subscriber(tmp_path, p
     assert set(chatter) <= {"/chatter"}
 
 
-def test_a_recording_is_received_whatever_quality_of_service_was_offered(tmp_path, play):
+def test_recording_is_received_whatever_quality_of_service_was_offered(tmp_path, play):
     # What was received once is not withheld now.
     node = play(write(tmp_path / "drive.mcap"), "?rate=20")
     asked = QoS(depth=100, deadline=Duration.from_seconds(0.001))
@@ -324,7 +324,7 @@ def test_types_that_only_the_recording_knows(tmp_path, play):
     assert all(isinstance(each.type, OpaqueType) for each in samples)
 
 
-def test_a_ros_1_definition_with_another_md5_is_reported(tmp_path, play, capsys):
+def test_ros_1_definition_with_another_md5_is_reported(tmp_path, play, capsys):
     path = tmp_path / "own.mcap"
     writer = mcap_writer.Writer(str(path))
     writer.start("ros1")

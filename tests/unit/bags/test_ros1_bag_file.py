@@ -28,7 +28,7 @@ def sample(number: int, size: int = 0) -> Sample:
 
 
 @pytest.mark.parametrize("compression", ["", "none", "lz4", "bz2"])
-def test_a_bag_of_many_chunks_is_complete(tmp_path, compression):
+def test_bag_of_many_chunks_is_complete(tmp_path, compression):
     path = tmp_path / "a.bag"
     file = create(path, "ros1", compression)
     words = file.channel("/words", STRING, [], b"/talker")
@@ -83,7 +83,7 @@ def texts(bag, *args):
 
 @pytest.mark.parametrize("name", ["a.bag", "a.bag.active"])
 @pytest.mark.parametrize("compression", ["none", "lz4", "bz2"])
-def test_a_bag_without_an_end_is_read_for_as_far_as_it_goes(tmp_path, caplog, name, compression):
+def test_bag_without_index_is_read_up_to_its_last_chunk(tmp_path, caplog, name, compression):
     path = unfinished(tmp_path / "a.bag", compression).rename(tmp_path / name)
     with open_bag(path) as bag:
         assert "not closed properly" in bag.problem
@@ -96,7 +96,7 @@ def test_a_bag_without_an_end_is_read_for_as_far_as_it_goes(tmp_path, caplog, na
         assert texts(bag, [kept], 10**9 + 50 * 10**6, 10**9 + 56 * 10**6) == ["000050", "000053"]
 
 
-def test_a_bag_cut_anywhere_is_read_or_refused(tmp_path, caplog):
+def test_bag_cut_anywhere_is_read_or_refused(tmp_path, caplog):
     data = unfinished(tmp_path / "a.bag").read_bytes()
     path = tmp_path / "cut.bag"
     counts = []
@@ -113,7 +113,7 @@ def test_a_bag_cut_anywhere_is_read_or_refused(tmp_path, caplog):
     assert {10, 90, 100} <= set(counts)
 
 
-def test_a_damaged_bag_is_read_or_refused(tmp_path, caplog):
+def test_damaged_bag_is_read_or_refused(tmp_path, caplog):
     data = unfinished(tmp_path / "a.bag").read_bytes()
     path, random = tmp_path / "hurt.bag", Random(2026)
     read = refused = 0
@@ -167,7 +167,7 @@ def test_messages_before_their_connection_are_counted_and_played(tmp_path, caplo
         eventually(lambda: found == wanted)
 
 
-def test_an_end_that_lies_before_the_messages_ends_playing(tmp_path):
+def test_end_that_lies_before_the_messages_ends_playing(tmp_path):
     writer = mcap_writer.Writer(str(tmp_path / "a.mcap"), use_statistics=True)
     writer.start("ros1")
     schema = writer.register_schema("std_msgs/String", "ros1msg", b"string data\n")
@@ -198,7 +198,7 @@ HEADER = "===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
 
 @pytest.mark.parametrize("case", BROKEN)
 @pytest.mark.parametrize("finished", [True, False])
-def test_a_broken_definition_is_replaced_by_that_with_its_md5(tmp_path, caplog, case, finished):
+def test_broken_definition_is_replaced_by_that_with_its_md5(tmp_path, caplog, case, finished):
     text, name = BROKEN[case]
     if name.startswith("own_msgs"):
         wanted = MessageType.from_text(name, f"Header header\nfloat64 data\n{HEADER}", ros=1)
@@ -221,7 +221,7 @@ def test_a_broken_definition_is_replaced_by_that_with_its_md5(tmp_path, caplog, 
         assert [found.decode_all(m.data) for m in bag.messages()] == [found.create()]
 
 
-def test_a_broken_definition_with_another_md5_stays_bytes(tmp_path):
+def test_broken_definition_with_another_md5_stays_bytes(tmp_path):
     path = tmp_path / "a.bag"
     file = create(path, "ros1", "none")
     kind = OpaqueType("own_msgs/Level", "a" * 32, text="float64 data\noops\n", ros=1)
@@ -235,7 +235,7 @@ def test_a_broken_definition_with_another_md5_stays_bytes(tmp_path):
     assert "no definition of own_msgs/msg/Level (ROS 1) was found" in found.reason
 
 
-def test_a_definition_of_broken_lines_alone_is_given_up():
+def test_definition_of_broken_lines_alone_is_given_up():
     assert mend("own_msgs/msg/Level", "oops\n" * 10_000, "a" * 32) is None
     # A text that takes the parser a while is not tried ten times.
     good = MessageType.from_text("own_msgs/msg/Level", "float64 data\n", ros=1)

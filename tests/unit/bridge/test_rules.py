@@ -109,14 +109,14 @@ def test_outbox_is_bounded_and_counts_losses():
     assert len(sent) == 2
 
 
-def test_a_line_for_people():
+def test_status_line():
     topic = RelayStatus("topic", "/a", "/a", "->", count=2, size=3_000_000, dropped=1)
     service = RelayStatus("service", "/s", "/s", "<-", count=1, refused=4)
     line = BridgeStatus((topic, service), ("", "")).line()
     assert line == "1 topic, 1 service: 2 messages, 3.0 MB, 1 call, 1 DROPPED, 4 REFUSED"
 
 
-def test_the_table_in_the_documentation_is_what_the_code_does():
+def test_table_in_the_documentation_is_what_the_code_does():
     spec = importlib.util.spec_from_file_location("table", ROOT / "scripts" / "bridge_table.py")
     table = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(table)

@@ -30,7 +30,7 @@ def test_equal_stamps_match_at_once():
     assert matcher.dropped == 2
 
 
-def test_the_nearest_are_matched_not_the_first():
+def test_nearest_are_matched_not_the_first():
     matcher: ApproximateTime[int] = ApproximateTime(2, 10, 100 * MS)
     # 0 and 33 could be matched with 30, too.
     assert feed(matcher, (0, 0), (1, 30)) == []
@@ -44,7 +44,7 @@ def test_messages_further_apart_than_the_slop_are_dropped():
     assert feed(matcher, (0, 91), (1, 120)) == [[91, 90]]
 
 
-def test_a_full_queue_makes_room():
+def test_full_queue_drops_the_oldest():
     matcher: ApproximateTime[int] = ApproximateTime(2, 3, 1000 * MS)
     assert feed(matcher, *((0, 10 * i) for i in range(8))) == []
     assert matcher.dropped == 5
@@ -85,7 +85,7 @@ def test_sets_are_in_order_disjoint_and_within_the_slop(seed):
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_the_way_that_messages_come_does_not_matter(seed):
+def test_order_of_arrival_does_not_matter(seed):
     made, arrivals = streams(seed)
     random = Random(seed)
     late = [random.choice([0, 15, 60, 200]) for _ in made]
@@ -99,7 +99,7 @@ def test_the_way_that_messages_come_does_not_matter(seed):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_the_same_rate_with_jitter_loses_nothing(seed):
+def test_same_rate_with_jitter_loses_nothing(seed):
     random = Random(seed)
     matcher: ApproximateTime[tuple[int, int]] = ApproximateTime(2, 10, 30 * MS)
     found = []

@@ -177,7 +177,7 @@ def test_jumps_are_notified(clock: Clock) -> None:
     assert ahead[-1].delta > Duration()
 
 
-def test_a_timer_calls_back_at_its_rate(clock: Clock) -> None:
+def test_timer_calls_back_at_its_rate(clock: Clock) -> None:
     calls: list[float] = []
     timer = clock.create_timer(0.02, lambda: calls.append(time.monotonic()))
     eventually(lambda: len(calls) >= 5)
@@ -190,7 +190,7 @@ def test_a_timer_calls_back_at_its_rate(clock: Clock) -> None:
     assert len(calls) <= count + 1
 
 
-def test_a_timer_follows_simulated_time(clock: Clock, settle: Callable[[], None]) -> None:
+def test_timer_follows_simulated_time(clock: Clock, settle: Callable[[], None]) -> None:
     clock.simulate(True)
     clock.advance(seconds(100))
     calls: list[Time] = []
@@ -209,7 +209,7 @@ def test_a_timer_follows_simulated_time(clock: Clock, settle: Callable[[], None]
     eventually(lambda: len(calls) == 3)
 
 
-def test_a_slow_callback_misses_turns_instead_of_piling_up(clock: Clock) -> None:
+def test_slow_callback_misses_turns_instead_of_piling_up(clock: Clock) -> None:
     dispatcher = Dispatcher("slow")
     release, calls, turns = threading.Event(), [], []
 
@@ -229,7 +229,7 @@ def test_a_slow_callback_misses_turns_instead_of_piling_up(clock: Clock) -> None
     assert len(calls) == 1
 
 
-def test_a_failing_callback_does_not_end_its_timer(
+def test_failing_callback_does_not_end_its_timer(
     clock: Clock, caplog: pytest.LogCaptureFixture
 ) -> None:
     calls: list[int] = []

@@ -35,7 +35,7 @@ def test_jobs_run_in_order_on_one_other_thread(dispatcher):
 
 
 @pytest.mark.parametrize("kind", ["dispatcher", "immediate"])
-def test_a_failing_job_is_logged_and_the_next_one_runs(kind, dispatcher, caplog):
+def test_failing_job_is_logged_and_the_next_one_runs(kind, dispatcher, caplog):
     executor = dispatcher if kind == "dispatcher" else IMMEDIATE
     executor.post(lambda: 1 / 0)
     seen = []
@@ -65,7 +65,7 @@ def test_no_error_ends_a_thread_that_others_need(error, dispatcher, caplog):
 
 
 @pytest.mark.parametrize("error", [SystemExit, KeyboardInterrupt])
-def test_the_main_thread_can_be_ended_from_guarded_code(error):
+def test_main_thread_can_be_ended_from_guarded_code(error):
     with pytest.raises(error), guarded(logging.getLogger("rosglass"), "a job failed"):
         raise error
 
@@ -95,13 +95,13 @@ def test_closing_ends_the_thread_and_forgets_what_waits(dispatcher):
     assert "test callbacks" not in [t.name for t in threading.enumerate()]
 
 
-def test_a_job_may_close_its_dispatcher(dispatcher):
+def test_job_may_close_its_dispatcher(dispatcher):
     closed = threading.Event()
     dispatcher.post(lambda: (dispatcher.close(), closed.set()))
     assert closed.wait(30)
 
 
-def test_a_job_that_hangs_does_not_hang_closing(dispatcher, monkeypatch, caplog):
+def test_job_that_hangs_does_not_hang_closing(dispatcher, monkeypatch, caplog):
     monkeypatch.setattr("rosglass.comm.executor._CLOSE_TIMEOUT_S", 0.05)
     started, go_on = threading.Event(), threading.Event()
     dispatcher.post(lambda: (started.set(), go_on.wait(30)))
@@ -135,7 +135,7 @@ def test_merging_listeners_get_the_newest_value_once(dispatcher):
     assert seen == [9]
 
 
-def test_a_listener_closed_while_its_call_waits_is_not_called(dispatcher):
+def test_listener_closed_while_its_call_waits_is_not_called(dispatcher):
     listeners = Listeners()
     go_on, seen = threading.Event(), []
     dispatcher.post(lambda: go_on.wait(30))
@@ -147,7 +147,7 @@ def test_a_listener_closed_while_its_call_waits_is_not_called(dispatcher):
     assert seen == []
 
 
-def test_a_worker_runs_when_asked_and_when_its_pause_is_over(caplog):
+def test_worker_runs_when_asked_and_when_its_pause_is_over(caplog):
     ran, idle = threading.Event(), threading.Event()
     worker = Worker("test worker", lambda paused: (idle if paused else ran).set(), pause=0.01)
     worker.wake()
@@ -158,7 +158,7 @@ def test_a_worker_runs_when_asked_and_when_its_pause_is_over(caplog):
     assert "test worker" not in [t.name for t in threading.enumerate()]
 
 
-def test_a_worker_survives_an_error_in_its_job(caplog):
+def test_worker_survives_an_error_in_its_job(caplog):
     calls = []
     twice = threading.Event()
 
@@ -174,7 +174,7 @@ def test_a_worker_survives_an_error_in_its_job(caplog):
     assert "of the job" in caplog.text
 
 
-def test_a_worker_that_hangs_does_not_hang_closing(monkeypatch, caplog):
+def test_worker_that_hangs_does_not_hang_closing(monkeypatch, caplog):
     monkeypatch.setattr("rosglass.comm.timers._CLOSE_TIMEOUT_S", 0.05)
     started, go_on = threading.Event(), threading.Event()
     worker = Worker("test worker", lambda _: (started.set(), go_on.wait(30)), pause=10)
@@ -185,7 +185,7 @@ def test_a_worker_that_hangs_does_not_hang_closing(monkeypatch, caplog):
     go_on.set()
 
 
-def test_a_busy_dispatcher_takes_several_jobs_at_a_time(dispatcher, monkeypatch):
+def test_busy_dispatcher_takes_several_jobs_at_a_time(dispatcher, monkeypatch):
     done, pauses = [], []
 
     def pause(seconds):
@@ -208,7 +208,7 @@ def test_a_busy_dispatcher_takes_several_jobs_at_a_time(dispatcher, monkeypatch)
     assert done == [(number, job) for number in range(3) for job in range(5)]
 
 
-def test_a_worker_rests_after_a_run_and_still_ends_at_once(monkeypatch):
+def test_worker_rests_after_a_run_and_still_ends_at_once(monkeypatch):
     monkeypatch.setattr("rosglass.comm.timers._REST_FACTOR", math.inf)
     monkeypatch.setattr("rosglass.comm.timers._MAX_REST_S", 3600.0)
     runs, ran = [], threading.Event()

@@ -52,7 +52,7 @@ def receive(executor, qos):
 
 @pytest.mark.parametrize("many", [False, True])
 @pytest.mark.parametrize("times", [1, 3])
-def test_a_subscription_goes_on_and_the_message_that_was_refused_comes(times, many, caplog):
+def test_subscription_continues_and_retries_the_rejected_message(times, many, caplog):
     keep_all = QoS(history=History.KEEP_ALL)
     sub, seen, came = receive(Refusing(times), keep_all)
     if many:
@@ -69,7 +69,7 @@ def test_a_subscription_goes_on_and_the_message_that_was_refused_comes(times, ma
     assert "queue.Full" in caplog.text
 
 
-def test_a_pool_that_was_shut_down_fills_neither_the_log_nor_memory(caplog):
+def test_closed_pool_fills_neither_log_nor_memory(caplog):
     class Pool(Executor):
         def __init__(self):
             self.pool = ThreadPoolExecutor()
@@ -185,7 +185,7 @@ def test_every_listener_is_notified_although_one_executor_raises(merge, caplog):
     assert "/t: the executor" in caplog.text
 
 
-def test_a_listener_whose_callback_fails_is_called_once(caplog):
+def test_listener_whose_callback_fails_is_called_once(caplog):
     class Bare(Executor):
         def post(self, job):
             job()
@@ -203,7 +203,7 @@ def test_a_listener_whose_callback_fails_is_called_once(caplog):
     assert "mine" in caplog.text
 
 
-def test_a_promise_calls_back_although_its_executor_raised_at_first():
+def test_promise_calls_back_although_its_executor_raised_at_first():
     promise, came = Promise(cancellable=True), threading.Event()
     promise.on_done(lambda _: came.set(), Refusing(2))
     promise.set_result(1)
@@ -230,7 +230,7 @@ def test_jobs_that_were_refused_keep_their_order_and_are_forgotten_at_the_end():
     assert seen
 
 
-def test_a_job_without_owner_is_given_up_and_counted(caplog):
+def test_job_without_owner_is_given_up_and_counted(caplog):
     executor = RetryingExecutor(Refusing(10**9), "on_done() of a call", give_up_s=0.1)
     executor.post(lambda: None)
     executor.post(lambda: None)

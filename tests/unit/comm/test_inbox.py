@@ -44,7 +44,7 @@ def test_keep_all_is_bounded_by_bytes_counts_what_it_drops_and_complains_once(ca
     )
 
 
-def test_the_slow_callback_is_named(caplog):
+def test_slow_callback_is_reported(caplog):
     def much_too_slow(_):
         go_on.wait(30)
 
@@ -59,7 +59,7 @@ def test_the_slow_callback_is_named(caplog):
     assert "much_too_slow is too slow" in caplog.text
 
 
-def test_a_slow_callback_lets_others_have_their_turn_and_goes_on_with_the_newest():
+def test_slow_callback_lets_others_have_their_turn_and_goes_on_with_the_newest():
     def slow(given):
         order.append(f"slow {given.sequence}")
         if len(order) == 1:
@@ -88,7 +88,7 @@ def test_one_message_beyond_the_limit_is_kept_all_the_same():
     assert sub.take() is not None
 
 
-def test_a_smaller_limit_holds_at_once_and_taking_makes_room():
+def test_smaller_limit_holds_at_once_and_taking_makes_room():
     sub = subscription()
     for _ in range(10):
         deliver(sub, sample(bytes(1000)))
@@ -102,7 +102,7 @@ def test_a_smaller_limit_holds_at_once_and_taking_makes_room():
 
 
 @pytest.mark.parametrize("limit", [0, -1, 1.5, "1 MB", None, True])
-def test_a_limit_is_a_number_of_bytes(limit):
+def test_limit_is_a_number_of_bytes(limit):
     with pytest.raises(ConversionError, match="/t: limit: expected a number of bytes"):
         subscription().set_inbox_limit(limit)
 
@@ -150,7 +150,7 @@ def test_samples_from_many_threads_are_called_back_with_one_at_a_time_each_once(
         chosen.close()
 
 
-def test_an_immediate_callback_that_publishes_to_itself_gets_what_fits_and_counts_the_rest():
+def test_immediate_callback_that_publishes_to_itself_gets_what_fits_and_counts_the_rest():
     seen = []
 
     def callback(got):
@@ -165,7 +165,7 @@ def test_an_immediate_callback_that_publishes_to_itself_gets_what_fits_and_count
     assert (sub.statistics().received, sub.statistics().dropped) == (6, 2)
 
 
-def test_an_interrupted_immediate_callback_does_not_end_the_subscription():
+def test_interrupted_immediate_callback_does_not_end_the_subscription():
     calls = []
 
     def callback(_):
@@ -223,7 +223,7 @@ def test_asynchronous_iteration():
     assert asyncio.run(run()) == [0, 1, 2]
 
 
-def test_a_task_that_was_cancelled_leaves_nothing_behind():
+def test_task_that_was_cancelled_leaves_nothing_behind():
     sub = subscription()
 
     async def collect():
@@ -263,7 +263,7 @@ def test_several_threads_wait_and_each_sample_goes_to_one_of_them():
 
 
 @pytest.mark.parametrize("timeout", [-1, "1", float("nan"), True])
-def test_a_timeout_is_a_number_of_seconds(timeout):
+def test_timeout_is_a_number_of_seconds(timeout):
     with pytest.raises(ConversionError, match="seconds"):
         subscription().wait(timeout)
 

@@ -31,7 +31,7 @@ def test_jobs_run_one_at_a_time_in_order():
     assert done == {number: list(range(200)) for number in range(4)}
 
 
-def test_a_job_may_add_jobs_which_run_after_it():
+def test_job_may_add_jobs_which_run_after_it():
     jobs, done = InOrder(), []
 
     def outer():
@@ -42,7 +42,7 @@ def test_a_job_may_add_jobs_which_run_after_it():
     assert done == ["outer", "inner"]
 
 
-def test_a_job_that_fails_is_logged_and_an_interrupted_one_stops_nothing(caplog):
+def test_job_that_fails_is_logged_and_an_interrupted_one_stops_nothing(caplog):
     jobs, done = InOrder(), []
 
     def fail():

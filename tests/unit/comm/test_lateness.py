@@ -28,7 +28,7 @@ def lateness_of(*samples):
 
 
 @pytest.mark.parametrize("skew", [0, 5_000_000, -5_000_000], ids=["same clock", "ahead", "behind"])
-def test_the_fastest_sample_is_the_measure_whatever_the_clocks_say(offset, skew):
+def test_lateness_is_relative_to_the_fastest_sample(offset, skew):
     samples = [(100 + 3, 100), (200 + 1, 200), (300 + 50, 300), (400 + 1, 400)]
     found = lateness_of(*[(received + skew, sent) for received, sent in samples])
     assert found == pytest.approx([0, 0, 49, 0], abs=0.3)
@@ -44,7 +44,7 @@ def test_samples_held_back_by_a_silent_link_are_late(offset):
     assert found[100] == pytest.approx(0, abs=10)
 
 
-def test_a_link_that_stays_slow_is_noticed_for_long(offset):
+def test_link_that_stays_slow_is_noticed_for_long(offset):
     samples = [(0, 0), *[(n * 1000 + 5000, n * 1000) for n in range(1, 601)]]
     found = lateness_of(*samples)
     assert found[1] == pytest.approx(5000, rel=0.01)
@@ -57,7 +57,7 @@ def test_clocks_that_drift_apart_are_followed(offset):
     assert max(found) < 2
 
 
-def test_a_publishers_clock_that_is_set_back_is_followed(offset):
+def test_publishers_clock_that_is_set_back_is_followed(offset):
     before = [(n * 100, n * 100) for n in range(10)]
     after = [(n * 100, n * 100 - 30_000) for n in range(10, 20)]
     found = lateness_of(*before, *after)
@@ -65,7 +65,7 @@ def test_a_publishers_clock_that_is_set_back_is_followed(offset):
     assert found[11:] == [0] * 9
 
 
-def test_a_publishers_clock_that_is_set_forward_is_followed(offset):
+def test_publishers_clock_that_is_set_forward_is_followed(offset):
     samples = [(0, 0), (100, 100), (200, 30_200), (300, 30_300)]
     assert lateness_of(*samples) == pytest.approx([0, 0, 0, 0], abs=1)
 
@@ -78,7 +78,7 @@ def test_one_sample_that_was_overtaken_does_not_count_as_a_clock_set_back(offset
 
 
 @pytest.mark.parametrize("step", [3600 * S, -3600 * S])
-def test_a_step_of_our_own_clock_is_measured(offset, step):
+def test_step_of_our_own_clock_is_measured(offset, step):
     seen = LatencyEstimator()
     assert seen.add(P, 100 * S, 100 * S) == 0
     offset[0] = step
@@ -157,7 +157,7 @@ def test_header_stamps_reveal_held_back_messages(topic, form, skew):
     assert found[110:] == pytest.approx([0] * 5, abs=10)
 
 
-def test_the_later_of_two_stamps_counts(topic):
+def test_later_of_two_stamps_counts(topic):
     # A bridge on this machine sends at once what a bad link has brought it late.
     samples = [
         stamped(n * 100 + 500, 100_000 + n * 100, "cdr", sent_ns=n * 100 * MS) for n in range(5)
@@ -177,7 +177,7 @@ def test_stamps_of_zero_and_stamps_that_stand_still_say_nothing(topic):
     assert topic(short, short._replace(type=None)) == [0, 0]
 
 
-def test_a_robots_clock_that_is_set_and_a_bag_that_loops_are_followed(topic):
+def test_robots_clock_that_is_set_and_a_bag_that_loops_are_followed(topic):
     live = [stamped(100_000 + n * 100, 100_000 + n * 100) for n in range(10)]
     back = [stamped(101_000 + n * 100, 71_000 + n * 100) for n in range(10)]
     ahead = [stamped(102_000 + n * 100, 602_000 + n * 100) for n in range(10)]
@@ -186,7 +186,7 @@ def test_a_robots_clock_that_is_set_and_a_bag_that_loops_are_followed(topic):
     assert found[11:] == pytest.approx([0] * 19, abs=1)
 
 
-def test_a_recording_that_was_paused_is_live_again_after_a_minute(topic):
+def test_recording_that_was_paused_is_live_again_after_a_minute(topic):
     live = [stamped(100_000 + n * 1000, 100_000 + n * 1000) for n in range(10)]
     after = [stamped(120_000 + n * 1000, 110_000 + n * 1000) for n in range(120)]
     found = topic(*live, *after)[10:]
@@ -194,7 +194,7 @@ def test_a_recording_that_was_paused_is_live_again_after_a_minute(topic):
     assert found[62:] == pytest.approx([0] * 58, abs=20)
 
 
-def test_the_fastest_message_is_remembered_through_a_long_outage(topic):
+def test_fastest_message_is_remembered_through_a_long_outage(topic):
     live = [stamped(100_000 + n * 1000, 100_000 + n * 1000) for n in range(10)]
     kept = [stamped(400_000, 110_000 + n * 1000) for n in range(280)]
     assert topic(*live, *kept)[10] == pytest.approx(290_000, rel=0.01)

@@ -32,7 +32,7 @@ def _is_ours(handler):
     return type(handler).__name__ in {"RosoutHandler", "LibraryLog"}
 
 
-def test_a_node_may_close_while_its_log_is_announced(node, monkeypatch):
+def test_node_may_close_while_its_log_is_announced(node, monkeypatch):
     create, closed = node.create_publisher, threading.Event()
 
     def create_and_close(*arguments):

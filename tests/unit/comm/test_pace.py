@@ -32,7 +32,7 @@ def test_timers_in_milliseconds_keep_the_rate(rate: float, monkeypatch: pytest.M
     assert turns == pytest.approx(10 * rate, rel=0.01)
 
 
-def test_a_pause_is_not_made_up_for() -> None:
+def test_pause_is_not_caught_up() -> None:
     pace = Pace()
     pace.take(0.1, 5.0)
     pace.take(0.1, 7.31)

@@ -29,7 +29,7 @@ def test_it_comes_once(promise):
     assert not promise.cancel()
 
 
-def test_an_error_comes_instead(promise):
+def test_error_in_place_of_a_result(promise):
     promise.set_exception(rosglass.TimeoutError("its own"))
     with pytest.raises(rosglass.TimeoutError, match="its own"):
         promise.result(1)
@@ -97,7 +97,7 @@ def test_asyncio_is_imported_only_on_use():
     assert done.stdout == "False\n"
 
 
-def test_a_thread_that_receives_may_look_but_not_wait(monkeypatch):
+def test_receiving_thread_may_poll_but_not_wait(monkeypatch):
     """Its result could never arrive."""
     monkeypatch.setattr("rosglass.comm.handle._RECEIVING", (__name__,))
     results = []

@@ -91,14 +91,14 @@ def test_policies_are_checked_where_they_are_written(policy, value, expected):
         QoS(**{policy: value})
 
 
-def test_a_limit_must_fit_into_64_bits_and_a_lifespan_is_the_publishers_alone():
+def test_limit_must_fit_into_64_bits_and_a_lifespan_is_the_publishers_alone():
     with pytest.raises(ArgumentError, match="below 292 years"):
         QoS(deadline=Duration(2**63 - 1))
     with pytest.raises(ArgumentError, match=r"lifespan: .*as it is the publisher's alone"):
         QoS(lifespan=BEST_AVAILABLE)
 
 
-def test_a_command_expires_at_the_sender_and_peers_are_not_asked_to_judge_its_age():
+def test_send_timeout_is_applied_by_the_sender_and_not_announced():
     command = QoS.command()
     assert (command.depth, command.reliability) == (1, Reliability.RELIABLE)
     assert command.durability is Durability.VOLATILE
@@ -118,7 +118,7 @@ def test_a_command_expires_at_the_sender_and_peers_are_not_asked_to_judge_its_ag
         ({"send_timeout": 0.3}, "a Duration above zero"),
     ],
 )
-def test_a_send_timeout_that_contradicts_the_profile_is_refused(policies, expected):
+def test_send_timeout_that_contradicts_the_profile_is_refused(policies, expected):
     with pytest.raises(ArgumentError, match=f"QoS: send_timeout: expected .*{expected}"):
         QoS(**{"send_timeout": SECOND, **policies})
 
@@ -144,7 +144,7 @@ def test_decided_policies_are_kept():
         assert profile.for_publisher([LATCHED]) is profile
 
 
-def test_the_systems_default_is_reliable_volatile_and_keeps_the_last():
+def test_systems_default_is_reliable_volatile_and_keeps_the_last():
     assert not QoS.system_default().is_decided
     assert QoS.system_default().for_subscription([BEST_EFFORT]) == QoS()
     assert QoS.system_default().for_publisher() == QoS()
@@ -169,7 +169,7 @@ def test_the_systems_default_is_reliable_volatile_and_keeps_the_last():
         ([QoS(lease_duration=SECOND)], QoS(lease_duration=SECOND)),
     ],
 )
-def test_a_subscription_takes_the_strongest_that_matches_all_publishers(offered, expected):
+def test_subscription_takes_the_strongest_that_matches_all_publishers(offered, expected):
     decided = BEST.for_subscription(offered)
     assert decided == expected
     assert decided.is_decided
@@ -189,7 +189,7 @@ def test_a_subscription_takes_the_strongest_that_matches_all_publishers(offered,
         ([QoS(lease_duration=SECOND)], replace(QoS.latched(10), lease_duration=SECOND)),
     ],
 )
-def test_a_publisher_offers_what_matches_all_subscriptions(requested, expected):
+def test_publisher_offers_what_matches_all_subscriptions(requested, expected):
     decided = BEST.for_publisher(requested)
     assert decided == expected
     assert [one.incompatibility(decided) for one in requested] == [""] * len(requested)

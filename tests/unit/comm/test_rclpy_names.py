@@ -94,7 +94,7 @@ def test_each_kind_of_object_says_it(node):
     assert {"create_service_client", "name"} <= set(dir(node))
 
 
-def test_an_error_in_a_property_is_not_covered_up(node):
+def test_error_in_a_property_is_not_covered_up(node):
     class Broken(rosglass.comm.Handle):
         @property
         def value(self):

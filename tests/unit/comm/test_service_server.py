@@ -80,7 +80,7 @@ def test_requests_that_come_before_the_replier_is_there_are_served_first() -> No
     assert [number for number, _ in replier.replies] == [1, 2, 3]
 
 
-def test_a_coroutine_that_begins_as_the_server_is_closed_is_cancelled() -> None:
+def test_coroutine_that_begins_as_the_server_is_closed_is_cancelled() -> None:
     servers: list[ServiceServer] = []
 
     class Closing(LoopExecutor):

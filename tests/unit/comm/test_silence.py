@@ -44,7 +44,7 @@ def test_slow_publisher_is_missed_after_five_of_its_intervals():
     assert "(it sent 1 per second before)" in problems[-2]
 
 
-def test_the_next_message_ends_it_at_once():
+def test_next_message_ends_it_at_once():
     silence, counts = SilenceMonitor(), regular(30)
     look(silence, [*counts, counts[-1], counts[-1]])
     assert silence.problem

@@ -48,7 +48,7 @@ def test_callbacks_get_decoded_messages_on_the_executor():
     assert seen == ["a", "b"]
 
 
-def test_a_slow_callback_gets_the_newest_samples():
+def test_slow_callback_gets_the_newest_samples():
     executor, seen = Manual(), []
     sub = subscription(executor, callback=seen.append)
     feed(sub, *"abcdef")
@@ -68,7 +68,7 @@ def test_samples_that_come_during_a_callback_wait_for_their_turn():
 
 
 @pytest.mark.parametrize("kind", ["callback", "raw_callback"])
-def test_a_failing_callback_is_logged_with_the_topic_and_the_next_sample_arrives(kind, caplog):
+def test_failing_callback_is_logged_with_the_topic_and_the_next_sample_arrives(kind, caplog):
     seen = []
 
     def callback(thing):
@@ -89,14 +89,14 @@ def test_failures_are_not_logged_for_every_message(caplog):
     assert caplog.text.count("callback of subscription /t failed") == 1
 
 
-def test_a_message_that_cannot_be_decoded_is_logged_and_the_next_one_arrives(caplog):
+def test_message_that_cannot_be_decoded_is_logged_and_the_next_one_arrives(caplog):
     seen = []
     feed(subscription(callback=seen.append), "bad", "good")
     assert seen == ["good"]
     assert "bad data" in caplog.text
 
 
-def test_a_callback_may_close_its_subscription_and_gets_nothing_more():
+def test_callback_may_close_its_subscription_and_gets_nothing_more():
     seen, executor = [], Manual()
     sub = subscription(executor, callback=lambda m: (seen.append(m), sub.close()))
     feed(sub, "a", "b")

@@ -34,7 +34,7 @@ def test_jobs_run_in_order_of_time_on_one_thread(timers):
     ]
 
 
-def test_a_job_that_was_called_off_does_not_run(timers):
+def test_cancelled_job_does_not_run(timers):
     done = queue.Queue()
 
     def begin():  # both jobs are due at once, but their thread is busy here
@@ -48,7 +48,7 @@ def test_a_job_that_was_called_off_does_not_run(timers):
     assert done.empty()
 
 
-def test_a_job_that_fails_is_logged_and_the_others_run(timers, caplog):
+def test_job_that_fails_is_logged_and_the_others_run(timers, caplog):
     done = threading.Event()
 
     def fail():
@@ -94,14 +94,14 @@ def test_without_jobs_there_is_no_thread(timers):
     assert threads()
 
 
-def test_a_job_that_calls_exit_ends_no_other(timers):
+def test_job_that_calls_exit_ends_no_other(timers):
     done = threading.Event()
     timers.after(0, lambda: sys.exit(1))
     timers.after(0, done.set)
     assert done.wait(30)
 
 
-def test_a_watchdog_that_is_closed_while_it_looks_looks_no_more(timers):
+def test_watchdog_closed_during_its_check_does_not_check_again(timers):
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
     missed = []
@@ -123,7 +123,7 @@ def test_a_watchdog_that_is_closed_while_it_looks_looks_no_more(timers):
     assert looks() is None
 
 
-def test_a_worker_that_is_woken_all_the_time_keeps_its_regular_run(eventually):
+def test_worker_that_is_woken_all_the_time_keeps_its_regular_run(eventually):
     runs = []
     worker = Worker("worker of the test", runs.append, pause=0.2)
     stop = threading.Event()

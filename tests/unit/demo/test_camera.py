@@ -57,7 +57,7 @@ def test_sky_is_above_and_floor_below(camera: Camera) -> None:
     assert abs(floor[2] - floor[0]) < 25, "grey"
 
 
-def test_the_image_follows_the_robot_and_the_carrier(camera: Camera) -> None:
+def test_image_follows_the_robot_and_the_carrier(camera: Camera) -> None:
     state = state_at(-5.4, -3.2, 0.55)
     start = camera.render(state)
     assert (camera.render(replace(state, yaw=0.6)) != start).mean() > 0.2
@@ -65,7 +65,7 @@ def test_the_image_follows_the_robot_and_the_carrier(camera: Camera) -> None:
     assert 0 < moved < 0.2, "only the carrier moved"
 
 
-def test_the_flashlight_lights_what_is_ahead(camera: Camera) -> None:
+def test_flashlight_lights_what_is_ahead(camera: Camera) -> None:
     state = state_at(-5.4, -3.2, 0.55)
     dark = camera.render(state)[240:400, 220:420].mean()
     assert camera.render(replace(state, flashlight=True))[240:400, 220:420].mean() > 1.2 * dark
@@ -90,7 +90,7 @@ def test_rendering_is_cheap(camera: Camera) -> None:
     assert min(costs) < 0.020
 
 
-def test_the_frame_code_can_be_read_back_from_the_image(camera: Camera) -> None:
+def test_frame_code_can_be_read_back_from_the_image(camera: Camera) -> None:
     picture = camera.render(state_at(-5.4, -3.2, 0.55))
     camera.stamp(picture, NOW, 70_000)
     x, y = CODE_POSITION
@@ -102,14 +102,14 @@ def test_the_frame_code_can_be_read_back_from_the_image(camera: Camera) -> None:
 
 
 @pytest.mark.parametrize("scale", [0.25, 0.7, 1.5, 2.0])
-def test_the_frame_code_survives_scaling(scale: float) -> None:
+def test_frame_code_survives_scaling(scale: float) -> None:
     picture = np.zeros((framecode.SQUARE, framecode.BITS * framecode.SQUARE, 3), np.uint8)
     framecode.draw(picture, framecode.FrameCode.at(NOW, 5), 0, 0)
     columns = ((np.arange(int(picture.shape[1] * scale)) + 0.5) / scale).astype(int)
     assert framecode.read(picture[4, columns, 0]).number == 5
 
 
-def test_a_disturbed_frame_code_is_refused() -> None:
+def test_disturbed_frame_code_is_refused() -> None:
     picture = np.zeros((framecode.SQUARE, framecode.BITS * framecode.SQUARE, 3), np.uint8)
     framecode.draw(picture, framecode.FrameCode.at(NOW, 5), 0, 0)
     row = picture[4, :, 0].copy()
@@ -120,7 +120,7 @@ def test_a_disturbed_frame_code_is_refused() -> None:
         framecode.read(row[:20])
 
 
-def test_the_clock_is_burnt_in(camera: Camera) -> None:
+def test_clock_is_burnt_in(camera: Camera) -> None:
     a, b = (camera.render(state_at(-5.4, -3.2, 0.55)) for _ in range(2))
     camera.stamp(a, NOW, 1)
     camera.stamp(b, NOW + 1_000_000_000, 1)

@@ -78,7 +78,7 @@ def test_nothing_is_drawn_without_subscribers(alive: tuple[Any, Robot], lives_on
         node.last(topic)
 
 
-def test_the_cloud_grows_into_what_the_laser_sees(alive: tuple[Any, Robot]) -> None:
+def test_cloud_grows_into_what_the_laser_sees(alive: tuple[Any, Robot]) -> None:
     eventually(lambda: alive[0].last("/points").width > 500)
 
 
@@ -93,9 +93,7 @@ def test_safe_is_slow(alive: tuple[Any, Robot], lives_on: Any) -> None:
     node.ask("/mode/supervised")
 
 
-def test_the_emergency_stop_ends_the_mission_and_holds(
-    alive: tuple[Any, Robot], lives_on: Any
-) -> None:
+def test_emergency_stop_ends_the_mission_and_holds(alive: tuple[Any, Robot], lives_on: Any) -> None:
     node, robot = alive
     node.ask("/mode/autonomous")
     eventually(lambda: abs(robot.state.speed) + abs(robot.state.turn) > 0.1)

@@ -36,7 +36,7 @@ def test_every_part_is_seen_in_a_colour_that_exists() -> None:
         assert all(float(edge) > 0 for edge in size.get("size", "").split())
 
 
-def test_the_robot_sends_a_frame_for_every_link_where_the_description_has_it() -> None:
+def test_robot_sends_a_frame_forevery_link_where_the_description_has_it() -> None:
     """RViz draws a link where tf says that it is, and none that tf does not know."""
     now, still = Time.now(), RobotState()
     sent = telemetry.static_frames(now)["transforms"] + Equipment.frames(now)

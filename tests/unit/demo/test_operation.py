@@ -117,7 +117,7 @@ def test_there_are_three_modes(rig: Rig, stub_node: type[StubNode]) -> None:
     assert rig.operation.max_speed == math.inf
 
 
-def test_the_mission_leads_round_in_mode_autonomous(rig: Rig) -> None:
+def test_mission_drives_its_round_in_autonomous_mode(rig: Rig) -> None:
     start = rig.place
     assert rig.proceed() == "waiting for mode autonomous"
     rig.node.ask("/mode/autonomous")
@@ -144,7 +144,7 @@ def test_manual_drive_takes_over(rig: Rig) -> None:
     assert rig.operation.mode == "safe"
 
 
-def test_a_goal_is_driven_to(rig: Rig) -> None:
+def test_robot_drives_to_a_goal(rig: Rig) -> None:
     x, y = rig.place
     assert rig.send(x + 1.0, y) == (ACTIVE, "on the way to the goal")
     assert rig.proceed() == "driving to the goal"
@@ -155,7 +155,7 @@ def test_a_goal_is_driven_to(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("mode", ["autonomous", "safe"])
-def test_a_goal_in_another_mode_is_refused_with_the_reason(rig: Rig, mode: str) -> None:
+def test_goal_in_another_mode_is_refused_with_the_reason(rig: Rig, mode: str) -> None:
     rig.node.ask(f"/mode/{mode}")
     assert rig.send(1, 1) == (REJECTED, f"no goals in mode {mode}; choose supervised")
     assert rig.operation.goal.position is None
@@ -189,7 +189,7 @@ def test_goal_ends_with_the_reason(rig: Rig, event: Any, status: int, reason: st
     assert rig.operation.goal.position is None
 
 
-def test_the_newest_goal_counts(rig: Rig) -> None:
+def test_newest_goal_is_used(rig: Rig) -> None:
     x, y = rig.place
     rig.send(x + 1.0, y)
     assert rig.send(x, y)[0] == ACTIVE
@@ -253,7 +253,7 @@ def test_behaviour_ends_with_the_reason(rig: Rig, event: Any, reason: str) -> No
     assert rig.simulation.state.turn == pytest.approx(0.0, abs=0.01)
 
 
-def test_a_behaviour_is_cancelled(rig: Rig) -> None:
+def test_behaviour_is_cancelled(rig: Rig) -> None:
     goal = Goal("Look around", lambda goal: setattr(goal, "is_cancel_requested", True))
     assert rig.behave(goal) == {"outcome": "cancelled"}
     assert rig.behave(Goal("Flippers up"))["outcome"] == "0.0 m driven"

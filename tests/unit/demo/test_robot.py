@@ -121,7 +121,7 @@ def test_it_drives_and_stops_when_commands_cease(node: StubNode, robot: Robot) -
     eventually(lambda: robot.state.speed == 0.0)
 
 
-def test_a_stop_is_confirmed_at_once_and_holds(node: StubNode, robot: Robot, lives_on: Any) -> None:
+def test_stop_is_confirmed_at_once_and_holds(node: StubNode, robot: Robot, lives_on: Any) -> None:
     confirmations = node.publishers["/emergency_stop/state"].sent
     count = len(confirmations)
     node.command("/emergency_stop", data=True)
@@ -140,7 +140,7 @@ def release(node: StubNode, number: int | None = None) -> None:
     node.command("/emergency_stop/release", data=number)
 
 
-def test_a_release_names_a_number_published_after_the_stop(node: StubNode, robot: Robot) -> None:
+def test_release_names_a_number_published_after_the_stop(node: StubNode, robot: Robot) -> None:
     eventually(lambda: node.publishers["/emergency_stop/counter"].sent)
     node.command("/emergency_stop", data=True)
     old = node.last("/emergency_stop/counter").data
@@ -156,7 +156,7 @@ def test_a_release_names_a_number_published_after_the_stop(node: StubNode, robot
     assert not robot.state.emergency_stop
 
 
-def test_a_release_that_is_too_old_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_release_that_is_too_old_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     releases = ReleaseCounter()
     first = releases.count()
     releases.check(first)
@@ -224,7 +224,7 @@ def test_flippers_and_lamp(node: StubNode, robot: Robot, lives_on: Any) -> None:
     assert robot.state.flippers == (0.5, 0.5, 0.3, 0.3)
 
 
-def test_a_network_that_blocks_does_not_stop_the_body(
+def test_blocked_network_does_not_stop_the_simulation(
     node: StubNode, robot: Robot, lives_on: Any
 ) -> None:
     stuck = [node.publishers["/camera/image_raw"], node.publishers["/odom"]]
@@ -270,20 +270,20 @@ def test_no_goal_overrides_the_emergency_stop(node: StubNode, robot: Robot) -> N
         node.services["/turn"](Turning(math.nan))
 
 
-def test_the_flashlight_is_a_service_too(node: StubNode, robot: Robot) -> None:
+def test_flashlight_is_a_service_too(node: StubNode, robot: Robot) -> None:
     request = type("Request", (), {"data": True})
     assert node.services["/flashlight/set"](request) == {"success": True, "message": "on"}
     assert robot.state.flashlight
 
 
-def test_the_highest_speed_is_a_parameter(node: StubNode, robot: Robot) -> None:
+def test_highest_speed_is_a_parameter(node: StubNode, robot: Robot) -> None:
     node.parameters.set(max_speed=0.1)
     eventually(lambda: node.command("/cmd_vel", linear={"x": 1.0}) or robot.state.speed > 0.05)
     assert robot.state.speed <= 0.11
     node.parameters.set(max_speed=1.2)
 
 
-def test_a_robot_that_fails_ends_instead_of_driving_on(stub_node: type[StubNode]) -> None:
+def test_robot_that_fails_ends_instead_of_driving_on(stub_node: type[StubNode]) -> None:
     node = stub_node()
     robot = Robot(node, RobotOptions(raw=False, compressed=False))  # type: ignore[arg-type]
     node.publishers["/odom"].publish = None  # type: ignore[assignment]

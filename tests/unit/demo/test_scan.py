@@ -10,7 +10,7 @@ import pytest
 from rosglass.demo.world import LaserScanner, World, cast, occupancy
 
 
-def test_a_ray_ends_at_the_nearest_edge() -> None:
+def test_ray_ends_at_the_nearest_edge() -> None:
     segments = np.array([[2.0, -1.0, 2.0, 1.0], [3.0, -1.0, 3.0, 1.0], [-1.0, 4.0, 1.0, 4.0]])
     angles = np.array([0.0, math.pi / 2, math.pi, math.atan2(0.5, 2.0)])
     assert cast(0.0, 0.0, angles, segments) == pytest.approx(
@@ -18,7 +18,7 @@ def test_a_ray_ends_at_the_nearest_edge() -> None:
     )
 
 
-def test_the_scan_shows_the_walls_where_they_are() -> None:
+def test_scan_shows_the_walls_where_they_are() -> None:
     world = World.standard()
     scanner = LaserScanner(world, noise=0.0)
     x, y, yaw = -5.4, -3.2, 0.55
@@ -37,7 +37,7 @@ def test_the_scan_shows_the_walls_where_they_are() -> None:
     assert towards(0.0) == pytest.approx(-2.12 - lx, abs=0.01), "the brick wall's west side"
 
 
-def test_the_scan_sees_the_carrier_move() -> None:
+def test_scan_sees_the_carrier_move() -> None:
     scanner = LaserScanner(World.standard(), noise=0.0)
     assert not np.array_equal(scanner.scan(-1, -3, 0, 0.0), scanner.scan(-1, -3, 0, 3.0))
 
@@ -53,7 +53,7 @@ def test_noise_is_small_and_the_same_for_the_same_seed() -> None:
     assert noisy.dtype == np.float32
 
 
-def test_the_map_marks_what_stands_and_where_nothing_is_known() -> None:
+def test_map_marks_obstacles_and_unknown_areas() -> None:
     world = World.standard()
     grid = occupancy(world, resolution=0.1, margin=0.5)
     assert grid.shape == (110, 150)

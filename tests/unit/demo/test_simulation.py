@@ -69,7 +69,7 @@ def test_walls_hold_whatever_the_operator_does(yaw: float) -> None:
     assert abs(robot.state.y) <= world.half_width - radius + 1e-6
 
 
-def test_a_wall_ahead_stalls_the_tracks() -> None:
+def test_wall_ahead_stalls_the_tracks() -> None:
     robot = at(-6.0, -3.2, math.pi)
     drive(robot, 1.0, 0.0, 2.0)
     assert robot.state.bumped
@@ -175,7 +175,7 @@ def test_impossible_steps_are_refused(dt: float) -> None:
         Simulation().step(dt)
 
 
-def test_the_nose_goes_up_on_the_ramp_and_down_behind_it() -> None:
+def test_nose_goes_up_on_the_ramp_and_down_behind_it() -> None:
     world = World.standard()
     slope = math.atan2(world.ramp.height, world.ramp.slope_length)
     robot = at(world.ramp.start + 0.65, world.ramp.y)
@@ -206,7 +206,7 @@ def test_driving_drains_the_battery_and_the_dock_fills_it() -> None:
     assert docked.state.charge > RobotState().charge
 
 
-def test_an_empty_battery_moves_nothing() -> None:
+def test_empty_battery_moves_nothing() -> None:
     robot = at(-3.5, -0.5, charge=0.0)
     robot.command_flippers([1.0] * 4)
     drive(robot, 1.0, 0.0, 1.0)
@@ -214,7 +214,7 @@ def test_an_empty_battery_moves_nothing() -> None:
     assert robot.state.flippers == RobotState().flippers
 
 
-def test_the_carrier_waits_for_the_robot() -> None:
+def test_carrier_waits_for_the_robot() -> None:
     world = World.standard()
     x, y = world.carrier(1.0).centre
     robot = at(x, y + 1.0, carrier_phase=1.0)
@@ -222,7 +222,7 @@ def test_the_carrier_waits_for_the_robot() -> None:
     assert robot.state.carrier_phase < 2.0
 
 
-def test_the_same_commands_give_the_same_drive() -> None:
+def test_same_commands_give_the_same_drive() -> None:
     ends = []
     for _ in range(2):
         robot = Simulation()

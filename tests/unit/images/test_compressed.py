@@ -119,7 +119,7 @@ def test_markers_without_end_take_no_time(data: bytes) -> None:
 
 @pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
 @pytest.mark.parametrize(("suffix", "dtype"), [(".jpg", np.uint8), (".png", np.uint16)])
-def test_a_bayer_pattern_in_the_format_is_restored(pattern: str, suffix: str, dtype: type) -> None:
+def test_bayer_pattern_in_the_format_is_restored(pattern: str, suffix: str, dtype: type) -> None:
     scale = 257 if dtype is np.uint16 else 1
     mosaic = np.zeros((16, 24), dtype)
     for place, channel in enumerate(pattern):
@@ -201,7 +201,7 @@ def test_cut_off_files_are_refused_at_every_length(suffix: str) -> None:
         (b"\xff\xd8\xff\xff", "cut off before its size"),
     ],
 )
-def test_other_files_are_named(data: bytes, reason: str) -> None:
+def test_other_files_are_reported(data: bytes, reason: str) -> None:
     with pytest.raises((DecodeError, UnsupportedError), match=reason):
         decompress(data)
 

@@ -115,7 +115,7 @@ def test_rvl_of_noise(seed: int) -> None:
 
 
 @pytest.mark.parametrize("kind", ["png", "rvl"])
-def test_a_covered_camera_sends_nothing_but_zeros(kind: str) -> None:
+def test_covered_camera_sends_nothing_but_zeros(kind: str) -> None:
     nothing = np.zeros((480, 640), np.uint16)
     image = decompress_depth(message(kind, nothing), f"16UC1; compressedDepth {kind}")
     assert (image.width, image.height) == (640, 480)

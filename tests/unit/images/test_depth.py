@@ -67,7 +67,7 @@ def test_unknown_depths_are_black() -> None:
     assert out[1:, :, :3].any(axis=2).all()
 
 
-def test_the_range_ignores_outliers_and_is_steady() -> None:
+def test_range_ignores_outliers_and_is_steady() -> None:
     view = DepthColors()
     depths = np.tile(np.linspace(1000, 3000, W), (H, 1))
     depths[0, :3] = [1, 65535, 65535]
@@ -112,12 +112,12 @@ def test_colours_land_in_the_display_s_memory() -> None:
         (("jet", 0.0, float("inf")), "must be a finite distance"),
     ],
 )
-def test_bad_settings_are_named(arguments: tuple, reason: str) -> None:
+def test_bad_settings_are_reported(arguments: tuple, reason: str) -> None:
     with pytest.raises(UnsupportedError, match=reason):
         DepthColors(*arguments)
 
 
-def test_other_images_are_named() -> None:
+def test_other_images_are_reported() -> None:
     with pytest.raises(UnsupportedError, match="'rgb8' holds no depths"):
         DepthColors().convert(RawImage(2, 2, "rgb8", 6, bytes(12)))
     with pytest.raises(DecodeError, match="step is 3"):

@@ -46,7 +46,7 @@ def test_missing_publisher_is_not_an_error() -> None:
         ("raw", {"/cam": ["std_msgs/msg/String"]}, "carries std_msgs/msg/String, not images"),
     ],
 )
-def test_unusable_transport_is_named(preferred: str, published: dict, reason: str) -> None:
+def test_unusable_transport_is_reported(preferred: str, published: dict, reason: str) -> None:
     with pytest.raises(UnsupportedError, match=reason):
         choose("/cam", preferred, published)
 
@@ -72,5 +72,5 @@ def test_images_stay_where_they_were_received() -> None:
         ("/image", "/camera_info"),
     ],
 )
-def test_the_camera_info_is_beside_the_image(topic: str, info: str) -> None:
+def test_camera_info_is_beside_the_image(topic: str, info: str) -> None:
     assert camera_info_topic(topic) == info

@@ -187,7 +187,7 @@ def test_key_frames_are_known_without_flags() -> None:
                 check(camera.read(100 + pts, **fields), number)
 
 
-def test_a_publisher_that_changes_its_codec() -> None:
+def test_publisher_that_changes_its_codec() -> None:
     camera = Camera("ffmpeg")
     check(camera.video("h264", 0), 0)
     check(camera.video("hevc;yuv420p;bgr8;bgr8", 0), 0)
@@ -225,7 +225,7 @@ def test_garbled_packets_never_crash_and_are_survived(encoding: str) -> None:
         ({"flags": 0}, NoPictureError, "first key frame"),
     ],
 )
-def test_bad_packets_are_named(fields: dict, error: type[Error], reason: str) -> None:
+def test_bad_packets_are_reported(fields: dict, error: type[Error], reason: str) -> None:
     good = {"encoding": "vp8", "pts": 0, "flags": 1, "data": b"abcd"}
     with pytest.raises(error, match=reason):
         Camera("ffmpeg").read(1, **good | fields)
@@ -238,7 +238,7 @@ def test_videos_that_would_fill_memory_are_refused(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize("transport", ["theora", "ffmpeg"])
-def test_without_pyav_the_fix_is_named(monkeypatch: pytest.MonkeyPatch, transport: str) -> None:
+def test_without_pyav_the_fix_is_reported(monkeypatch: pytest.MonkeyPatch, transport: str) -> None:
     def absent(name: str) -> Any:
         raise ImportError(name)
 
@@ -336,7 +336,7 @@ def test_theora_repeats_frames_with_empty_packets() -> None:
         (b"\x80theora\x03\x02\x01" + bytes(40), "0x0 pixels"),
     ],
 )
-def test_bad_headers_are_named(data: bytes, reason: str) -> None:
+def test_bad_headers_are_reported(data: bytes, reason: str) -> None:
     with pytest.raises(DecodeError, match=reason):
         Camera("theora").read(1, data=data)
 

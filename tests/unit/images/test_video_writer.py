@@ -73,7 +73,7 @@ def test_blue_before_red(tmp_path: Path) -> None:
     assert near(found[20, 30], RED)
 
 
-def test_a_window_that_changes_its_size(tmp_path: Path) -> None:
+def test_window_that_is_resized(tmp_path: Path) -> None:
     writer = VideoWriter(tmp_path / "video.mp4")
     add(
         writer,
@@ -141,7 +141,7 @@ def test_without_pyav_the_error_says_how_to_install_it(
         VideoWriter(tmp_path / "video.mp4")
 
 
-def test_a_full_disk_ends_the_file(tmp_path: Path) -> None:
+def test_full_disk_ends_the_file(tmp_path: Path) -> None:
     from pathlib import Path
 
     from waiting import eventually

@@ -94,7 +94,7 @@ def test_nothing_is_copied_where_nothing_moves(encoding: str) -> None:
         ({"region": (0, 5, 2, 2)}, "not within the image of 12x6"),
     ],
 )
-def test_impossible_views_are_named(fields: dict, reason: str) -> None:
+def test_impossible_views_are_reported(fields: dict, reason: str) -> None:
     with pytest.raises(UnsupportedError, match=reason):
         View(**fields).apply(frame("rgba8"))
 
@@ -123,7 +123,7 @@ def test_saved_as_jpeg_and_of_a_part(tmp_path: Path) -> None:
     np.testing.assert_allclose(back.astype(int), 90, atol=2)
 
 
-def test_unsaveable_view_is_named(tmp_path: Path) -> None:
+def test_unsaveable_view_is_reported(tmp_path: Path) -> None:
     with pytest.raises(UnsupportedError, match=r"\.gif'.*these work: \.png"):
         save(frame("rgb8"), tmp_path / "a.gif")
     with pytest.raises(UnsupportedError, match="without an ending"):

@@ -46,7 +46,7 @@ def in_memory(in_time: None) -> Iterator[None]:
     ],
     ids=["lines", "comment", "comments", "blanks", "indented"],
 )
-def test_a_megabyte_of_nothing(text: str) -> None:
+def test_megabyte_of_nothing(text: str) -> None:
     assert parse_message(text, "my_msgs/Odd").fields == ()
 
 
@@ -73,7 +73,7 @@ def test_a_megabyte_of_nothing(text: str) -> None:
     ],
     ids=range(17),
 )
-def test_a_megabyte_of_errors(text: str) -> None:
+def test_megabyte_of_errors(text: str) -> None:
     with pytest.raises(DefinitionError) as caught:
         parse_message(text, "my_msgs/Odd")
     assert len(str(caught.value)) < 3 * MEGABYTE
@@ -91,7 +91,7 @@ def test_a_megabyte_of_errors(text: str) -> None:
     ],
     ids=range(6),
 )
-def test_a_megabyte_in_one_element(text: str) -> None:
+def test_megabyte_in_one_element(text: str) -> None:
     assert parse_message(text, "my_msgs/Odd")
 
 

@@ -356,7 +356,7 @@ def test_arguments_are_checked() -> None:
         parse_idl(" " * (4 * 1024 * 1024 + 1), "a/B")
 
 
-def test_a_char_of_idl_is_described_as_such() -> None:
+def test_char_of_idl_is_described_as_such() -> None:
     """rosidl_generator_type_description: char is FIELD_TYPE_CHAR; a .msg file's is uint8."""
     text = wrapped("char a; sequence<char> b; char c[3]; sequence<char, 4> d; uint8 e;")
     definition = message(text, "a/msg/B")

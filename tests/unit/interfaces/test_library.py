@@ -168,7 +168,7 @@ def test_cycles(library: Library, texts: dict[str, str], chain: str) -> None:
     assert caught.value.line == 1
 
 
-def test_a_failed_type_does_not_spoil_others(library: Library) -> None:
+def test_failed_type_does_not_affect_others(library: Library) -> None:
     library.add_text("my_msgs/A", "B b\nMissing m")
     library.add_text("my_msgs/B", "geometry_msgs/Point p")
     with pytest.raises(DefinitionError):
@@ -189,7 +189,7 @@ def test_joined_definitions_bring_their_types_along(library: Library) -> None:
     assert library.source("my_msgs/Inner", 1).provider == "wire /outer"
 
 
-def test_the_worlds_are_apart(library: Library) -> None:
+def test_ros_1_and_ros_2_types_are_separate(library: Library) -> None:
     library.add_text("my_msgs/Odd", "int32 x", ros=1)
     with pytest.raises(TypeNotFoundError, match="ROS 1 has it"):
         library.definition("my_msgs/Odd")
@@ -238,7 +238,7 @@ def test_received_and_local_definition_differ(library: Library) -> None:
     assert "Library.prefer('wire') or Library.prefer('distribution')" in text
 
 
-def test_a_nested_type_that_differs_is_named(library: Library) -> None:
+def test_nested_type_that_differs_is_reported(library: Library) -> None:
     text = "std_msgs/Header header\n===\nMSG: std_msgs/Header\nstring frame_id"
     library.add_text("my_msgs/Odd", text)
     with pytest.raises(DefinitionConflictError, match="two sources define std_msgs/msg/Header"):

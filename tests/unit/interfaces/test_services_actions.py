@@ -207,7 +207,7 @@ def test_text_of_implied_messages_parses_to_the_same(library: Library) -> None:
     assert md5(again.definition("my_msgs/CountAction", ros=1)) == md5(action)
 
 
-def test_a_message_of_the_same_name_comes_first(library: Library) -> None:
+def test_message_of_the_same_name_comes_first(library: Library) -> None:
     library.add_text("my_msgs/action/Count", ACTION, ros=1)
     library.add_text("my_msgs/CountGoal", "int32 other", ros=1)
     goal = library.definition("my_msgs/CountGoal", ros=1)
@@ -238,7 +238,7 @@ def test_names_that_are_not_implied_are_unknown(library: Library, name: str, ros
 
 
 @pytest.mark.parametrize("name", ["pkg/action/Count", "pkg/Count"])
-def test_an_action_of_ros1_whose_file_is_missing(name: str) -> None:
+def test_action_of_ros1_whose_file_is_missing(name: str) -> None:
     made = Library()
     made.add_text("pkg/action/Count", ACTION, ros=1)
     library = Library()

@@ -174,7 +174,7 @@ def test_text_is_written_for_people_and_parsers() -> None:
         "# Head",
     ],
 )
-def test_a_head_comment_is_written_once(text):
+def test_head_comment_is_written_once(text):
     """It belongs to the message and to the first field that it touches."""
     definition = parse_message(text, "my_msgs/Odd")
     written = message_text(definition)
@@ -422,7 +422,7 @@ def test_types_that_contain_themselves_are_refused() -> None:
     ("name", "text"),
     [("big", "much"), ("small", "-129"), ("name", "too long a name"), ("switches", "(True,)")],
 )
-def test_defaults_that_do_not_fit_are_named(
+def test_defaults_that_do_not_fit_are_reported(
     name: str, text: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     described = sent(odd())

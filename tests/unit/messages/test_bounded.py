@@ -169,7 +169,7 @@ def definition_of(nested: Mapping[str, Definition]) -> Definition:
 
 
 @pytest.mark.parametrize("way", ["type", "provider"])
-def test_a_type_that_takes_long_keeps_no_other_waiting(way: str) -> None:
+def test_slow_type_does_not_block_others(way: str) -> None:
     provider = SlowProvider()
     slow = provider.slow
     provider.add(Definition("b/msg/B", 2, ()))

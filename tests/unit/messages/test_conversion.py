@@ -57,7 +57,7 @@ def test_values_that_fit(kind: str, value: Any, meant: Any) -> None:
         assert one.decode(data).data == meant
 
 
-def test_a_byte_is_written_as_rclpy_writes_it_and_read_as_a_number() -> None:
+def test_byte_is_written_as_rclpy_writes_it_and_read_as_a_number() -> None:
     status = rosglass.load("diagnostic_msgs/msg/DiagnosticStatus")
     message = status.create()
     message.level = b"\x02"

@@ -26,7 +26,7 @@ def test_messages_come_decoded_and_in_order(point):
     assert [point.encode(one) for one in messages] == data
 
 
-def test_a_message_may_be_changed_and_the_others_stay(point):
+def test_message_may_be_changed_and_the_others_stay(point):
     first, second = point.decode_small(some(point, 2))
     first.point.x = 9.0
     assert (first.point.x, second.point.x) == (9.0, 1.5)

@@ -347,7 +347,7 @@ def test_hostile_counts_allocate_nothing(name: str, ros: int) -> None:
 
 
 @pytest.mark.parametrize(("name", "ros"), CASES)
-def test_a_refused_message_stays_refused(name: str, ros: int) -> None:
+def test_refused_message_stays_refused(name: str, ros: int) -> None:
     # A failed read must not leave a half-filled message that looks complete the next time.
     kind, wire = load(name, ros), WIRE[ros]
 

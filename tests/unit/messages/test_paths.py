@@ -218,7 +218,7 @@ def test_paths_that_do_not_exist(path: str, problem: str) -> None:
         _ = KIND.create(VALUE)[path]
 
 
-def test_a_path_is_a_string() -> None:
+def test_path_is_a_string() -> None:
     with pytest.raises(FieldPathError, match="is a str"):
         KIND.path(3)  # type: ignore[arg-type]
 
@@ -249,7 +249,7 @@ def test_cut_off_bytes_give_the_value_or_an_error(path: str, wire: str) -> None:
     assert all(found in ("t", right) for found in outcomes)
 
 
-def test_foreign_headers_are_named() -> None:
+def test_foreign_headers_are_reported() -> None:
     twist = load("geometry_msgs/msg/Twist")
     for path in ("linear.x", "linear"):
         read = twist.path(path)

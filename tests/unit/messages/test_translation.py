@@ -146,7 +146,7 @@ def test_arrays_beyond_a_bound_are_refused():
         there.encode(ours.encode({"dimensions": [1.0] * 4}))
 
 
-def test_untranslated_fields_are_named():
+def test_untranslated_fields_are_reported():
     there = Translation(load("visualization_msgs/MarkerArray"))
     assert "markers[].mesh_file" in there.left_out
     assert there.type == load("visualization_msgs/MarkerArray", ros=1)
@@ -179,7 +179,7 @@ def test_log_levels():
     assert there.left_out == ("header.frame_id", "topics")
 
 
-def test_a_type_of_ones_own_becomes_ros1s():
+def test_own_type_is_translated_to_ros_1():
     text = """
 string NAME="a b"
 bool ON=true
@@ -262,7 +262,7 @@ def test_services(ros, name, other):
     assert translated == found.response.encode(server.response.encode(answer))
 
 
-def test_a_message_without_fields_whose_counterpart_has_some():
+def test_message_without_fields_whose_counterpart_has_some():
     ours = MessageType.from_text("own_msgs/msg/Grown", "", ros=1)
     grown = MessageType.from_text("own_msgs/msg/Grown", "int32 a 7\nstring[] b\n")
     there, back = Translation(ours, [grown]), Translation(grown, [ours])

@@ -83,7 +83,7 @@ def plain(value: Any) -> Any:
 
 
 @pytest.mark.parametrize(("wire", "order"), FORMATS)
-def test_a_view_reads_as_its_bytes_do(wire: str, order: str) -> None:
+def test_view_reads_as_its_bytes_do(wire: str, order: str) -> None:
     data = KIND.encode(VALUE, wire=wire, byteorder=order)
     expected = KIND.decode(data, wire=wire)
     assert KIND.decode(view(data), wire=wire) == expected
@@ -173,7 +173,7 @@ def test_elements_keep_the_memory_alive() -> None:
     assert gone() is None
 
 
-def test_an_untouched_message_is_passed_on() -> None:
+def test_untouched_message_is_passed_on() -> None:
     seen = view(PICTURE)
     message = IMAGE.decode(seen)
     (part,) = IMAGE.encode_parts(message)
@@ -184,7 +184,7 @@ def test_an_untouched_message_is_passed_on() -> None:
     assert b"".join(IMAGE.encode_parts(message)) == IMAGE.encode(message) == PICTURE
 
 
-def test_the_other_byte_order_is_not_passed_on() -> None:
+def test_other_byte_order_is_not_passed_on() -> None:
     big = IMAGE.encode(IMAGE.decode(PICTURE), byteorder="big")
     assert IMAGE.encode(IMAGE.decode(view(big))) == PICTURE
     (part,) = IMAGE.encode_parts(IMAGE.decode(view(big)), byteorder="big")

@@ -35,7 +35,7 @@ def test_goals_are_pending_in_order_of_arrival():
     }
 
 
-def test_a_goal_that_is_known_is_not_taken_twice():
+def test_known_goal_is_not_accepted_twice():
     goals = filled()
     (entry, *_) = goals
     entry.set_state(ServerState.ACTIVE)
@@ -69,7 +69,7 @@ def test_only_goals_that_wait_or_run_can_be_cancelled(state):
     assert bool(chosen) is (state in (ServerState.PENDING, ServerState.ACTIVE))
 
 
-def test_a_request_that_comes_before_its_goal_recalls_it():
+def test_cancel_request_before_its_goal_recalls_it():
     goals = GoalList()
     assert goals.select("late", Time(), NOW) == []
     assert states(goals) == {"late": ServerState.RECALLING}

@@ -73,7 +73,7 @@ def machine(state):
     return made
 
 
-def test_the_table_is_whole():
+def test_transition_table_is_complete():
     assert len(CASES) == len(CommState) * (len(ServerState) - 1)
     assert set(WAYS) == set(CommState)
 
@@ -95,7 +95,7 @@ def test_each_status_in_each_state(state, said, cell):
 
 
 @pytest.mark.parametrize(("state", "said"), list(itertools.product(NOT_DONE, ENDS)))
-def test_a_result_ends_a_goal_in_each_state(state, said):
+def test_result_ends_a_goal_in_each_state(state, said):
     made = machine(state)
     steps = made.on_result(said)
     assert steps[-1] == (CommState.DONE, ENDS[said][1])
@@ -109,7 +109,7 @@ def test_a_result_ends_a_goal_in_each_state(state, said):
 
 
 @pytest.mark.parametrize("said", [said for said in ServerState if said not in ENDS])
-def test_a_result_without_an_end_is_refused(said):
+def test_result_without_an_end_is_refused(said):
     made = machine(CommState.ACTIVE)
     with pytest.raises(ValueError, match="a result with the state"):
         made.on_result(said)
@@ -120,7 +120,7 @@ def test_a_result_without_an_end_is_refused(said):
 @pytest.mark.parametrize(
     "lose", [CommStateMachine.on_server_lost, lambda m: m.on_status(ServerState.LOST)]
 )
-def test_a_goal_is_lost_in_each_state(state, lose):
+def test_goal_is_lost_in_each_state(state, lose):
     made = machine(state)
     assert lose(made) == [(CommState.DONE, GoalStatus.LOST)]
     assert (made.state, made.terminal) == (CommState.DONE, TerminalState.LOST)

@@ -115,7 +115,7 @@ def test_ids_are_unique_among_a_nodes_clients(connect):
     assert len({goal.id for goal in goals}) == 6
 
 
-def test_a_server_is_there_once_all_five_topics_are_connected(connect, eventually):
+def test_server_is_ready_once_all_five_topics_are_connected(connect, eventually):
     Puppet(connect("robot"), leave_out="cancel")
     client = connect("us").create_action_client(NAME, TYPE)
     eventually(
@@ -128,7 +128,7 @@ def test_a_server_is_there_once_all_five_topics_are_connected(connect, eventuall
     assert goal.terminal_state is TerminalState.LOST
 
 
-def test_a_server_that_no_longer_names_a_goal_has_lost_it(sent, puppet, client):
+def test_goal_missing_from_the_status_is_lost(sent, puppet, client):
     puppet.say()
     with pytest.raises(ConnectionLostError, match=r"does not know goal .* any more"):
         sent.result(30)
@@ -144,7 +144,7 @@ def test_another_servers_list_does_not_lose_a_goal(sent, connect, puppet, eventu
     assert sent.result(30).result.result == 7
 
 
-def test_a_goal_whose_result_never_comes_is_lost(sent, puppet, eventually, monkeypatch):
+def test_goal_whose_result_never_comes_is_lost(sent, puppet, eventually, monkeypatch):
     monkeypatch.setattr("rosglass.ros1.actionlib_client._OVERDUE_S", 0.2)
     puppet.say(g0="SUCCEEDED")
     eventually(lambda: sent.comm_state is CommState.WAITING_FOR_RESULT)
@@ -159,7 +159,7 @@ def test_a_goal_whose_result_never_comes_is_lost(sent, puppet, eventually, monke
         sent.result(0)
 
 
-def test_a_silent_server_that_lives_keeps_its_goals(sent, puppet, monkeypatch, eventually):
+def test_silent_server_that_lives_keeps_its_goals(sent, puppet, monkeypatch, eventually):
     asked = []
     monkeypatch.setattr("rosglass.ros1.actionlib_client._SILENCE_S", 0.1)
     monkeypatch.setattr(
@@ -172,7 +172,7 @@ def test_a_silent_server_that_lives_keeps_its_goals(sent, puppet, monkeypatch, e
     assert sent.result(30).status is GoalStatus.SUCCEEDED
 
 
-def test_a_silent_server_that_does_not_answer_loses_its_goals(sent, client, monkeypatch):
+def test_silent_server_that_does_not_answer_loses_its_goals(sent, client, monkeypatch):
     def fail(*_given, **_more):
         raise ConnectionLostError("http://robot:1 does not answer: no answer in time")
 
@@ -186,9 +186,7 @@ def test_a_silent_server_that_does_not_answer_loses_its_goals(sent, client, monk
     assert "does not publish the status of its goals" in client.problem
 
 
-def test_a_request_to_cancel_is_repeated_until_the_server_shows_a_sign(
-    sent, puppet, eventually, monkeypatch
-):
+def test_cancel_request_is_repeated_until_the_server_reacts(sent, puppet, eventually, monkeypatch):
     monkeypatch.setattr("rosglass.ros1.actionlib_client._REPEAT_S", 0.05)
     answer = sent.cancel()
     eventually(lambda: sent.comm_state is CommState.WAITING_FOR_CANCEL_ACK)
@@ -209,7 +207,7 @@ def test_a_request_to_cancel_is_repeated_until_the_server_shows_a_sign(
     assert sent.text == "stopped"
 
 
-def test_a_request_to_cancel_outlives_a_connection(sent, client, puppet, eventually, monkeypatch):
+def test_request_to_cancel_outlives_a_connection(sent, client, puppet, eventually, monkeypatch):
     monkeypatch.setattr("rosglass.ros1.actionlib_client._REPEAT_S", 0.02)
     puppet.listening.close()
     eventually(lambda: not client.ready)
@@ -229,7 +227,7 @@ def test_a_request_to_cancel_outlives_a_connection(sent, client, puppet, eventua
     assert every.result(30).accepted == (sent.id,)
 
 
-def test_a_server_that_was_cut_off_may_have_missed_a_goal(client, puppet, eventually):
+def test_server_that_was_cut_off_may_have_missed_a_goal(client, puppet, eventually):
     goal = client.send_goal({"goal": 1}, timeout=None)
     eventually(lambda: puppet.goals)
     puppet.listening.close()
@@ -248,7 +246,7 @@ def test_unacknowledged_cancel_request_times_out(sent):
     assert sent.status is GoalStatus.EXECUTING
 
 
-def test_a_goal_that_ended_cannot_be_cancelled(sent, puppet):
+def test_goal_that_ended_cannot_be_cancelled(sent, puppet):
     late = sent.cancel()
     puppet.end("SUCCEEDED")
     assert late.result(30) == ((), "the goal has ended already: succeeded")
@@ -296,7 +294,7 @@ def test_cancelling_all_waits_for_a_server_and_keeps_goals_back(connect):
     assert puppet.goals == []
 
 
-def test_a_server_that_does_not_know_a_goal_in_time(client, puppet, eventually):
+def test_server_that_does_not_know_a_goal_in_time(client, puppet, eventually):
     goal = client.send_goal({"goal": 1}, timeout=0.3)
     with pytest.raises(TimeoutError, match=r"did not acknowledge goal .* within 0.3 s"):
         goal.result(5)
@@ -305,7 +303,7 @@ def test_a_server_that_does_not_know_a_goal_in_time(client, puppet, eventually):
         goal.acceptance.result(0)
 
 
-def test_a_goal_may_be_pending_for_longer_than_the_timeout(client, puppet, eventually):
+def test_goal_may_be_pending_for_longer_than_the_timeout(client, puppet, eventually):
     goal = client.send_goal({"goal": 1}, timeout=0.3)
     eventually(lambda: puppet.goals)
     puppet.say(g0="PENDING")
@@ -351,7 +349,7 @@ def test_ends_without_result(state, error, text, sent, puppet):
     assert sent.terminal_state.name == state
 
 
-def test_a_result_may_come_before_any_status(client, puppet, eventually):
+def test_result_may_come_before_any_status(client, puppet, eventually):
     goal = client.send_goal({"goal": 1})
     eventually(lambda: puppet.goals)
     states = []
@@ -372,13 +370,13 @@ def test_goals_of_other_clients_are_ignored(sent, puppet, connect, eventually):
     assert sent.status is GoalStatus.EXECUTING
 
 
-def test_a_server_of_another_type_is_named(puppet, connect, eventually):
+def test_server_of_another_type_is_reported(puppet, connect, eventually):
     client = connect("us").create_action_client(NAME, "actionlib/TwoIntsAction")
     eventually(lambda: "actionlib/TestActionResult" in client.problem)
     assert not client.ready
 
 
-def test_a_closed_client_resends_nothing(sent, client, puppet):
+def test_closed_client_resends_nothing(sent, client, puppet):
     answer = client.cancel_all()
     client.close()
     with pytest.raises(NodeClosedError):
@@ -402,7 +400,7 @@ def own_server(connect):
 
 
 @pytest.mark.usefixtures("own_server")
-def test_a_type_that_is_not_known_here_is_put_together_of_what_the_topics_tell(connect, eventually):
+def test_unknown_type_is_assembled_from_the_topics(connect, eventually):
     client = connect("us", library=Library()).create_action_client(NAME)
     goal = client.send_goal({"order": 4})
     eventually(lambda: "no definition of own_msgs/CountGoal is known" in client.problem)
@@ -477,7 +475,7 @@ def until_stopped(goal):
     return {"result": 3}
 
 
-def test_a_request_to_cancel_before_the_goal(offer, eventually):
+def test_request_to_cancel_before_the_goal(offer, eventually):
     executed = []
     _, hand = offer(executed.append)
     hand.stop("a")
@@ -504,7 +502,7 @@ def test_goals_not_newer_than_the_last_request_are_recalled(offer, eventually):
     ]
 
 
-def test_a_goal_that_is_sent_twice_is_executed_once(offer, eventually):
+def test_goal_that_is_sent_twice_is_executed_once(offer, eventually):
     executed = []
     _, hand = offer(lambda goal: executed.append(goal.id_text))
     hand.send("a", stamp=1)
@@ -516,7 +514,7 @@ def test_a_goal_that_is_sent_twice_is_executed_once(offer, eventually):
     assert len(hand.results["a"]) == 1
 
 
-def test_a_goal_without_id_gets_one(offer, eventually):
+def test_goal_without_id_gets_one(offer, eventually):
     server, hand = offer(until_stopped)
     hand.send("", stamp=0)
     (goal,) = eventually(lambda: server.goals)
@@ -529,7 +527,7 @@ def test_a_goal_without_id_gets_one(offer, eventually):
     assert hand.results == {goal.id_text: [("SUCCEEDED", "early", 1)]}
 
 
-def test_a_goal_cancelled_while_it_is_decided_on_is_recalled(offer, eventually):
+def test_goal_cancelled_during_its_acceptance_is_recalled(offer, eventually):
     decide, executed = threading.Event(), []
     _, hand = offer(executed.append, accept=lambda _: decide.wait(30))
     hand.send("a")
@@ -572,7 +570,7 @@ def test_failing_callback_aborts_the_goal_with_the_reason(execute, text, offer, 
     assert status_text.startswith(text)
 
 
-def test_an_executor_takes_goals_one_by_one(offer, eventually):
+def test_executor_takes_goals_one_by_one(offer, eventually):
     executor, begun = Dispatcher("goals"), []
 
     def execute(goal):
@@ -594,7 +592,7 @@ def test_an_executor_takes_goals_one_by_one(offer, eventually):
     executor.close()
 
 
-def test_a_newer_goal_takes_the_place_of_those_before(offer, eventually):
+def test_newer_goal_preempts_those_before(offer, eventually):
     begun, go = [], threading.Event()
 
     def execute(goal):
@@ -626,7 +624,7 @@ def test_a_newer_goal_takes_the_place_of_those_before(offer, eventually):
     assert begun == ["a", "c"]
 
 
-def test_a_goal_that_waits_for_its_turn_is_recalled(offer, eventually):
+def test_goal_that_waits_for_its_turn_is_recalled(offer, eventually):
     go = threading.Event()
     server, hand = offer(lambda _: go.wait(30) and None, simple=True)
     hand.send("a")
@@ -667,7 +665,7 @@ def test_closing_ends_all_goals(offer, eventually):
     assert server.problem == "the server is closed"
 
 
-def test_a_server_is_simple_or_not(connect):
+def test_simple_and_full_action_servers(connect):
     node = connect("robot")
     with pytest.raises(ConversionError, match="simple: expected"):
         node.create_action_server(NAME, TYPE, until_stopped, simple="yes")

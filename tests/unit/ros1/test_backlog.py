@@ -47,18 +47,18 @@ def test_each_message_after_an_outage_makes_up_for_its_part(monitor: BacklogMoni
     assert lateness(BacklogMonitor(), *burst) == [0] * 100, "of an irregular publisher"
 
 
-def test_a_whole_backlog_that_arrives_at_once_ends_with_what_is_new(
+def test_backlog_that_arrives_at_once_ends_with_the_newest(
     monitor: BacklogMonitor,
 ) -> None:
     assert lateness(monitor, (110.0, 100)) == [0]
     assert lateness(monitor, (120.0, 40), (120.01, 60)) == pytest.approx([6.0, 0.01], abs=0.05)
 
 
-def test_a_publisher_that_died_in_the_outage_never_becomes_live(monitor: BacklogMonitor) -> None:
+def test_publisher_that_died_in_the_outage_never_becomes_live(monitor: BacklogMonitor) -> None:
     assert lateness(monitor, *[(110.0 + n / 1000, 1) for n in range(20)])[-1] > 7.9
 
 
-def test_a_link_that_loses_packets_holds_back_again_and_again(monitor: BacklogMonitor) -> None:
+def test_link_that_loses_packets_holds_back_again_and_again(monitor: BacklogMonitor) -> None:
     # 1.6 s of nothing, half of it at once, 0.5 s of nothing, the rest.
     found = lateness(monitor, (101.6, 1), (101.61, 7), (102.1, 1), (102.11, 12))
     assert found == pytest.approx([1.5, 0.81, 1.2, 0.01], abs=0.02)
@@ -71,7 +71,7 @@ def test_messages_that_the_publisher_dropped_are_not_waited_for(monitor: Backlog
     assert found[11:] == [0] * 9
 
 
-def test_a_publisher_that_sends_less_often_is_not_late_for_long(monitor: BacklogMonitor) -> None:
+def test_publisher_that_sends_less_often_is_not_late_for_long(monitor: BacklogMonitor) -> None:
     assert not any(lateness(monitor, *((100 + 0.25 * n, 1) for n in range(1, 50))))
     found = lateness(monitor, *((113 + 1.0 * n, 1) for n in range(1, 10)))
     assert found[-1] > 5, "each of them may have been held back"

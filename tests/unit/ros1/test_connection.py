@@ -105,7 +105,7 @@ def test_peer_without_header_times_out(loop, monkeypatch):
     assert "no connection header was received" in eventually(lambda: end.ended)[0]
 
 
-def test_a_header_in_time_lasts(loop, monkeypatch):
+def test_connection_with_a_header_in_time_stays_open(loop, monkeypatch):
     monkeypatch.setattr(module, "_HEADER_TIMEOUT_S", 0.1)
     end = End(loop)
     end.peer.sendall(HEADER)
@@ -125,7 +125,7 @@ def test_refused_connection_ends_with_the_reason(loop):
     assert "refused" in eventually(lambda: ended)[0]
 
 
-def test_a_slow_reader_costs_bounded_memory_and_gets_the_newest(loop):
+def test_slow_reader_costs_bounded_memory_and_gets_the_newest(loop):
     end = End(loop, small=True)
     for number in range(100):
         end.link.send([frame(b"%05d" % number + b"x" * 20_000)], keep=5)
@@ -142,7 +142,7 @@ def test_a_slow_reader_costs_bounded_memory_and_gets_the_newest(loop):
     end.peer.close()
 
 
-def test_the_caller_may_reuse_its_buffer(loop):
+def test_caller_may_reuse_its_buffer(loop):
     end = End(loop, small=True)
     data = bytearray(frame(b"a" * 300_000))
     end.link.send([data])
@@ -202,7 +202,7 @@ def test_many_non_urgent_frames_do_not_block_the_loop(loop, end):
     assert time.monotonic() - began < 15
 
 
-def test_a_failing_callback_ends_its_connection_only(loop, end, caplog):
+def test_failing_callback_ends_its_connection_only(loop, end, caplog):
     def fail(_):
         raise ValueError("a fault")
 

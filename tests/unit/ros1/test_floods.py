@@ -120,7 +120,7 @@ def resident():
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def test_an_unfinished_request_leaves_no_memory_behind(node, eventually):
+def test_unfinished_request_leaves_no_memory_behind(node, eventually):
     node.create_service_server("/reset", "std_srvs/Empty", lambda _: {})
     before = resident()
     fields = (b"callerid=/caller", b"service=/reset", b"md5sum=*")
@@ -140,7 +140,7 @@ def test_an_unfinished_request_leaves_no_memory_behind(node, eventually):
         gc.enable()
 
 
-def test_a_call_of_countless_values_is_refused(node, caplog):
+def test_call_with_too_many_values_is_refused(node, caplog):
     uri, _ = place(node)
     values = [""] * 100_000
     with pytest.raises(xmlrpc.client.Fault, match="more than 100000 XML elements"):

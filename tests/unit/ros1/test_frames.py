@@ -77,7 +77,7 @@ def test_frames_are_the_same_however_they_arrive(step):
 
 
 @pytest.mark.parametrize("step", [1, 5, 65536])
-def test_a_byte_is_in_front_of_each_response_but_not_of_the_header(step):
+def test_byte_is_in_front_of_each_response_but_not_of_the_header(step):
     taken = Taken(lead=1)
     taken.give(encode_header(HEADER) + b"\1" + frame(b"yes") + b"\0" + frame(b"n" * 6000), step)
     assert [bytes(one) for one in taken.frames] == [b"yes", b"n" * 6000]
@@ -91,7 +91,7 @@ def test_runs_of_one_size_end_where_the_size_changes():
     assert taken.frames == contents
 
 
-def test_a_header_may_be_longer_than_what_is_read_at_once():
+def test_header_may_be_longer_than_what_is_read_at_once():
     taken = Taken()
     long = HEADER | {"message_definition": "x" * 200_000}
     taken.give(encode_header(long) + frame(b"after"))
@@ -108,12 +108,12 @@ def test_a_header_may_be_longer_than_what_is_read_at_once():
         (encode_header(HEADER) + b"\xff" * 8, "a message"),
     ],
 )
-def test_a_length_that_cannot_be_is_refused(data, what):
+def test_impossible_length_is_refused(data, what):
     with pytest.raises(DecodeError, match=f"/peer.*{what} claims to have"):
         Taken().give(data)
 
 
-def test_a_header_of_countless_fields_is_refused():
+def test_header_with_too_many_fields_is_refused():
     # A million of them would keep the node's loop busy for half a second.
     with pytest.raises(DecodeError, match="more than 100 fields"):
         Taken().give(encode_header({f"n{k}": "" for k in range(101)}))
@@ -177,7 +177,7 @@ def drain(outgoing: Outgoing, step: int = 1_000_000) -> bytes:
     return bytes(sent)
 
 
-def test_the_oldest_makes_room_and_is_counted():
+def test_oldest_message_is_dropped_and_counted():
     outgoing = Outgoing()
     for number in range(10):
         outgoing.add(Frame([b"%d" % number]), 0, 3, 0)
@@ -195,7 +195,7 @@ def test_partly_sent_frame_is_finished():
     assert outgoing.lost == 4
 
 
-def test_a_latched_message_does_not_make_room_until_there_is_a_newer_one():
+def test_latched_message_is_not_dropped_before_a_newer_one_arrives():
     outgoing, latched = Outgoing(), Frame([b"L"], kept=True)
     outgoing.add(latched, 0, 0, 0)
     for number in range(5):

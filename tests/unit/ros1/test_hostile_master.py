@@ -95,7 +95,7 @@ def test_parameters_of_any_depth_are_refused_or_returned(master, connect):
             call_node(f"http://127.0.0.1:{port}", "getParam", "/x", "/deep")
 
 
-def test_a_deep_parameter_is_refused_and_the_rest_of_the_node_goes_on(master, connect, eventually):
+def test_deep_parameter_is_refused_and_the_rest_of_the_node_goes_on(master, connect, eventually):
     """Some node has set it: the master is not at fault, and must not count as lost."""
     master.tree["deep"] = deep(120)
     node = connect("panel", own_services=False)
@@ -108,7 +108,7 @@ def test_a_deep_parameter_is_refused_and_the_rest_of_the_node_goes_on(master, co
 
 
 @pytest.mark.parametrize("method", ["getSystemState", "getTopicTypes", "getPid", "lookupNode"])
-def test_a_node_lives_through_a_lying_master_and_recovers(master, connect, eventually, method):
+def test_node_survives_a_lying_master_and_recovers(master, connect, eventually, method):
     node = connect("panel", own_services=False)
     node.create_publisher("/words", "std_msgs/String")
     eventually(lambda: node.status().state is ConnectionState.CONNECTED)
@@ -248,7 +248,7 @@ EXTERNAL = (
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_peer_that_answers_badly_costs_no_more_than_the_timeout(fault):
+def test_peer_that_answers_badly_costs_no_more_than_the_timeout(fault):
     port = serve(FAULTS[fault])
     began = time.monotonic()
     with pytest.raises(ConnectionLostError):
@@ -271,7 +271,7 @@ def test_no_endless_tag_is_read(tag):
         client.parse_xml(b"<a>" + tag.encode() + b"x" * 2_000_000)
 
 
-def test_a_call_that_drips_ends_when_the_node_is_closed():
+def test_call_answered_byte_by_byte_ends_when_the_node_is_closed():
     asked = threading.Event()
 
     def drip_on(sock):

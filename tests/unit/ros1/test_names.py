@@ -101,7 +101,7 @@ def test_anonymous_names_are_valid_and_differ(monkeypatch: pytest.MonkeyPatch) -
         ("ros1://[fe80::1]:7", {}, "http://[fe80::1]:7"),
     ],
 )
-def test_the_master(url: str, env: dict[str, str], master: str) -> None:
+def test_master(url: str, env: dict[str, str], master: str) -> None:
     assert Ros1Options.parse(url, env).master == master
 
 
@@ -129,7 +129,7 @@ def test_the_master(url: str, env: dict[str, str], master: str) -> None:
         ("ros1://robot?anonymous=maybe", "url option anonymous: expected true or false"),
     ],
 )
-def test_bad_urls_are_named(url: str, message: str) -> None:
+def test_bad_urls_are_reported(url: str, message: str) -> None:
     with pytest.raises(ConversionError, match=message):
         rosglass.connect(url)
 
@@ -147,7 +147,7 @@ def test_bad_urls_are_named(url: str, message: str) -> None:
         ("ROS_HOSTNAME", "my robot", "ROS_HOSTNAME: expected a host or address only"),
     ],
 )
-def test_bad_variables_are_named(variable: str, value: str, message: str) -> None:
+def test_bad_variables_are_reported(variable: str, value: str, message: str) -> None:
     with pytest.raises(ConversionError, match=message):
         Ros1Options.parse("ros1://", {variable: value})
 
@@ -163,12 +163,12 @@ def test_bad_variables_are_named(variable: str, value: str, message: str) -> Non
         ("ros1://r", {"ROS_IP": "  "}, ("", "")),
     ],
 )
-def test_the_own_address(url: str, env: dict[str, str], expected: tuple[str, str]) -> None:
+def test_own_address(url: str, env: dict[str, str], expected: tuple[str, str]) -> None:
     options = Ros1Options.parse(url, env)
     assert (options.address, options.source) == expected
 
 
-def test_the_address_towards_the_master_is_announced() -> None:
+def test_address_towards_the_master_is_announced() -> None:
     assert address.own_address("192.168.7.5") == "192.168.7.5"
     assert address.own_address("::ffff:192.168.7.5") == "192.168.7.5"
     # A master on this machine does not show how other machines reach it.
@@ -188,7 +188,7 @@ def test_the_address_towards_the_master_is_announced() -> None:
         ("panel", "0.0.0.0"),
     ],
 )
-def test_a_node_listens_only_where_it_is_announced(host: str, interface: str) -> None:
+def test_node_listens_only_where_it_is_announced(host: str, interface: str) -> None:
     assert address.interface_of(host) == interface
 
 
@@ -208,7 +208,7 @@ def test_addresses_that_others_cannot_reach_are_doubted() -> None:
     )
 
 
-def test_ports_that_are_taken_are_named() -> None:
+def test_ports_that_are_taken_are_reported() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

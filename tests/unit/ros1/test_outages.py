@@ -16,7 +16,7 @@ from rosglass.wires.tcpros.io_loop import IoLoop
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have other options")
-def test_a_subscriber_gives_a_connection_up_before_its_publisher_does():
+def test_subscriber_gives_a_connection_up_before_its_publisher_does():
     with socket.socket() as sock:
         survive_outages(sock)
         names = (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
@@ -59,7 +59,7 @@ def test_connection_without_acknowledgement_for_half_a_second_has_stalled(clock,
 @pytest.mark.skipif(
     sys.platform != "linux", reason="other systems do not report unacknowledged bytes"
 )
-def test_a_silent_subscriber_gets_only_the_newest_afterwards(monkeypatch):
+def test_silent_subscriber_gets_only_the_newest_afterwards(monkeypatch):
     silent = [False]
     real = UnackedBytes.unacked
     # As if the network was away: what is sent stays unconfirmed.

@@ -121,5 +121,5 @@ def test_namespaces_are_flattened_and_empty_ones_left_out():
         ([1], [1, 2], False),
     ],
 )
-def test_a_change_of_type_is_a_change(one, other, equal):
+def test_change_of_type_is_a_change(one, other, equal):
     assert is_same_value(one, other) is equal

@@ -201,7 +201,7 @@ def test_promises_keep_their_order_and_fail_together(server, master):
     assert server.get_async("/a").result(30) == 49
 
 
-def test_a_closed_node_asks_the_server_nothing(node, server):
+def test_closed_node_sends_no_requests(node, server):
     node.close()
     for ask in (
         lambda: server.get("/a"),
@@ -287,7 +287,7 @@ def test_closing_and_following_anew_at_once_stays_registered(server, master, eve
     eventually(lambda: master.followers["/a"])
 
 
-def test_a_master_that_was_restarted_is_asked_again(server, master, node, eventually):
+def test_master_that_was_restarted_is_queried_again(server, master, node, eventually):
     notified: list[object] = []
     server.set("/a", 1)
     subscription = server.subscribe("/a", notified.append)
@@ -404,7 +404,7 @@ def test_changes_by_others_are_reported_below_the_node(node, master, eventually)
     assert events[3].new == {"c/d": True}
 
 
-def test_a_client_watches_before_there_is_a_master(master, connect, eventually):
+def test_client_subscribes_before_the_master_starts(master, connect, eventually):
     master.stop()
     node, events = connect("arm", own_services=False), []
     with node.create_parameter_client("/robot") as client:
@@ -450,7 +450,7 @@ def test_invalid_parameter_value_is_refused_on_the_command_line(connect):
 # -- other nodes' --------------------------------------------------------------------------------
 
 
-def test_a_client_reads_and_sets_a_namespace(node, master):
+def test_client_reads_and_sets_a_namespace(node, master):
     master.tree = {"robot": {"a": 1, "b": {"c": [1, 2], "d": {"e": "x"}}, "m": [1, 2.5]}, "z": 1}
     with node.create_parameter_client("/robot") as client:
         assert client.wait_for_server(30)
@@ -536,7 +536,7 @@ def test_subscriber_of_a_namespace_is_notified_of_a_file_as_a_whole(server, tmp_
     assert [len(value) for value in notified] == [1, 51]
 
 
-def test_a_refusal_is_a_master_error_elsewhere(node, master):
+def test_other_refusals_are_master_errors(node, master):
     master.answers["getParamNames"] = lambda *_: [0, "broken", 0]
     with pytest.raises(MasterError, match="broken"):
         node.parameter_server.names()

@@ -96,7 +96,7 @@ def stop(connect, eventually):
     return robot, cockpit, publisher, subscription
 
 
-def test_a_publisher_that_the_master_names_again_at_once_stays_connected(stop):
+def test_publisher_that_is_listed_again_at_once_stays_connected(stop):
     robot, cockpit, publisher, subscription = stop
     links = publisher_links(cockpit, "/stop")
     update_publishers(cockpit, "/stop", [])
@@ -106,7 +106,7 @@ def test_a_publisher_that_the_master_names_again_at_once_stays_connected(stop):
     assert publisher_links(cockpit, "/stop") == links
 
 
-def test_the_last_message_of_a_publisher_that_leaves_is_received(stop, eventually, monkeypatch):
+def test_last_message_of_a_publisher_that_leaves_is_received(stop, eventually, monkeypatch):
     monkeypatch.setattr(topic_subscription, "_LAST_MESSAGES_S", 3600.0)
     _, cockpit, publisher, subscription = stop
     update_publishers(cockpit, "/stop", [])
@@ -116,7 +116,7 @@ def test_the_last_message_of_a_publisher_that_leaves_is_received(stop, eventuall
     eventually(lambda: not publisher_links(cockpit, "/stop"))
 
 
-def test_a_connection_ends_whose_publisher_the_master_names_no_more(stop, eventually, monkeypatch):
+def test_connection_to_an_unregistered_publisher_is_closed(stop, eventually, monkeypatch):
     monkeypatch.setattr(topic_subscription, "_LAST_MESSAGES_S", 0.01)
     _, cockpit, publisher, subscription = stop
     update_publishers(cockpit, "/stop", [])
@@ -125,7 +125,7 @@ def test_a_connection_ends_whose_publisher_the_master_names_no_more(stop, eventu
 
 
 @pytest.mark.parametrize("type", ["std_msgs/Int32", None])
-def test_a_subscription_made_as_the_publisher_connects_gets_the_latched_message_once(
+def test_subscription_made_as_the_publisher_connects_gets_the_latched_message_once(
     connect, eventually, monkeypatch, type
 ):
     robot, cockpit = connect("robot"), connect("cockpit")

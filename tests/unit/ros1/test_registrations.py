@@ -53,7 +53,7 @@ def connected(master: FakeMaster, name: str = "panel") -> Any:
     return made
 
 
-def test_a_master_that_restarts_with_the_same_process_number(
+def test_master_that_restarts_with_the_same_process_number(
     master: FakeMaster, node: Ros1Node
 ) -> None:
     node.create_publisher("/a", "std_msgs/Empty")
@@ -160,7 +160,7 @@ def test_invalid_answers_of_a_master_are_reported(master: FakeMaster, answer: An
         eventually(lambda: node.status().state is ConnectionState.CONNECTED)
 
 
-def test_something_else_at_the_masters_address_is_named() -> None:
+def test_something_else_at_the_masters_address_is_reported() -> None:
     def serve() -> None:
         while True:
             try:
@@ -179,7 +179,7 @@ def test_something_else_at_the_masters_address_is_named() -> None:
         server.shutdown(socket.SHUT_RDWR)
 
 
-def test_a_refusal_is_shown_logged_once_and_tried_again(
+def test_refusal_is_shown_logged_once_and_tried_again(
     master: FakeMaster, node: Ros1Node, caplog: pytest.LogCaptureFixture
 ) -> None:
     master.answers["registerPublisher"] = lambda *_: [0, "not on Sundays", 0]
@@ -194,7 +194,7 @@ def test_a_refusal_is_shown_logged_once_and_tried_again(
     assert "/panel" in master.publishers["/a"]
 
 
-def test_a_wrong_own_address_is_shown(master: FakeMaster, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wrong_own_address_is_shown(master: FakeMaster, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_IP", "192.0.2.7")
     url = master.url.partition("?")[0]
     with rosglass.connect(url, "panel", own_services=False) as node:
@@ -206,7 +206,7 @@ def test_a_wrong_own_address_is_shown(master: FakeMaster, monkeypatch: pytest.Mo
         assert master.publishers["/a"]["/panel"].startswith("http://192.0.2.7:")
 
 
-def test_a_new_network_address_is_announced_and_the_node_lives_on(
+def test_new_network_address_is_announced_and_the_node_continues(
     master: FakeMaster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(address, "_route_elsewhere", lambda: "127.0.0.1")
@@ -224,7 +224,7 @@ def test_a_new_network_address_is_announced_and_the_node_lives_on(
         eventually(lambda: node.status().state is ConnectionState.CLOSED)
 
 
-def test_a_node_listens_where_it_is_reached_and_keeps_its_ports(
+def test_node_listens_where_it_is_reached_and_keeps_its_ports(
     master: FakeMaster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(address, "_route_elsewhere", lambda: "")
@@ -263,7 +263,7 @@ def test_another_port_is_announced_where_a_program_has_the_nodes_port(
         assert publisher_address(node, "/a")[0] == "127.0.0.3"
 
 
-def test_a_node_whose_port_is_taken_says_so_and_listens_once_it_is_free(
+def test_node_whose_port_is_taken_says_so_and_listens_once_it_is_free(
     master: FakeMaster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(address, "_route_elsewhere", lambda: "")
@@ -284,7 +284,7 @@ def test_a_node_whose_port_is_taken_says_so_and_listens_once_it_is_free(
 GONE = "http://127.0.0.1:1/"
 
 
-def test_a_node_that_was_killed_has_its_name_only_until_the_next_one_registers(
+def test_killed_node_keeps_its_name_until_another_registers(
     master: FakeMaster,
 ) -> None:
     master.publishers["/old"] = {"/panel": GONE}
@@ -299,7 +299,7 @@ def test_a_node_that_was_killed_has_its_name_only_until_the_next_one_registers(
     node.close()
 
 
-def test_a_connected_node_has_its_name(master: FakeMaster, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_connected_node_keeps_its_name(master: FakeMaster, monkeypatch: pytest.MonkeyPatch) -> None:
     asked, join = threading.Event(), ParameterWatches._join
     listed: list[bool] = []
 
@@ -318,7 +318,7 @@ def test_a_connected_node_has_its_name(master: FakeMaster, monkeypatch: pytest.M
         assert listed[0]
 
 
-def test_a_later_node_of_the_name_ends_a_node(master: FakeMaster, node: Any) -> None:
+def test_later_node_of_the_name_ends_a_node(master: FakeMaster, node: Any) -> None:
     eventually(lambda: master.lookupNode("", "/panel")[2] == node_uri(node))
     master.answers["lookupNode"] = lambda *_: [1, "", GONE]  # and its call gets lost
     eventually(lambda: node.status().state is ConnectionState.CLOSED)
@@ -334,7 +334,7 @@ def test_a_later_node_of_the_name_ends_a_node(master: FakeMaster, node: Any) -> 
         "[/panel] Reason: new node registered with same name",  # but we have it again
     ],
 )
-def test_a_call_of_the_master_that_is_out_of_date_ends_no_node(
+def test_outdated_shutdown_of_the_master_ends_no_node(
     master: FakeMaster, node: Any, reason: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "rosglass.ros1")
@@ -347,7 +347,7 @@ def test_a_call_of_the_master_that_is_out_of_date_ends_no_node(
     eventually(lambda: node.status().state is ConnectionState.CLOSED)
 
 
-def test_a_publisher_that_leaves_while_its_subscriber_registers_again_is_dropped(
+def test_publisher_that_leaves_while_its_subscriber_registers_again_is_dropped(
     master: FakeMaster, node: Any
 ) -> None:
     robot = connected(master, "robot")
@@ -438,7 +438,7 @@ def test_graph_and_its_changes_are_reported(master: FakeMaster, node: Ros1Node) 
     eventually(lambda: "/scan" not in node.topics())
 
 
-def test_a_publisher_that_is_registered_but_gone_is_named(
+def test_publisher_that_is_registered_but_gone_is_reported(
     master: FakeMaster, node: Ros1Node
 ) -> None:
     port = free_port()
@@ -448,7 +448,7 @@ def test_a_publisher_that_is_registered_but_gone_is_named(
     assert f"http://127.0.0.1:{port}/" in subscription.problem
 
 
-def test_a_node_asks_little_of_its_master(master: FakeMaster, node: Ros1Node) -> None:
+def test_node_sends_few_requests_to_its_master(master: FakeMaster, node: Ros1Node) -> None:
     node.create_publisher("/a", "std_msgs/Empty")
     eventually(lambda: "/panel" in master.publishers.get("/a", {}))
     looks = master.calls.count("getSystemState")
@@ -485,7 +485,7 @@ def test_node_that_closes_while_the_master_hangs_is_unregistered_later(
     assert not thread.is_alive()
 
 
-def test_a_master_that_stays_away_is_not_waited_for_for_ever(
+def test_unregistering_gives_up_on_an_absent_master(
     master: FakeMaster, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(registrations, "_RETRY_LIMIT_S", 0.0)
@@ -501,7 +501,7 @@ def test_a_master_that_stays_away_is_not_waited_for_for_ever(
     master.start()
 
 
-def test_a_node_on_the_ports_of_one_that_is_seen_off_stays_registered(
+def test_node_on_the_ports_of_an_unregistered_one_stays_registered(
     master: FakeMaster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = connected(master, "same")
@@ -591,7 +591,7 @@ def test_unreachable_publisher_is_logged_once_for_all_topics_and_on_return(
     robot.close()
 
 
-def test_a_node_that_cannot_be_made_leaves_nothing_behind(
+def test_node_that_cannot_be_made_leaves_nothing_behind(
     master: FakeMaster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: Any) -> None:

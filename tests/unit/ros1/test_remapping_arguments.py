@@ -36,7 +36,7 @@ def test_names_are_replaced(rule: str, old: str, new: str) -> None:
     assert parsed.remappings("node", "/ns") == {old: new}
 
 
-def test_the_last_rule_for_a_name_counts_as_in_rospy() -> None:
+def test_last_rule_for_a_name_counts_as_in_rospy() -> None:
     assert parse("a:=b", "/ns/a:=c").remappings("node", "/ns") == {"/ns/a": "/ns/c"}
 
 
@@ -112,7 +112,7 @@ def test_ros_2_arguments_work_in_ros_1() -> None:
         (["--ros-args", "a"], "argument 3: 'a' is not a rule"),
     ],
 )
-def test_bad_arguments_are_named(arguments: list[str], message: str) -> None:
+def test_bad_arguments_are_reported(arguments: list[str], message: str) -> None:
     with pytest.raises(RosArgumentError, match=message):
         parse(*arguments)
 
@@ -139,7 +139,7 @@ def test_node_obeys_its_arguments(master: FakeMaster, monkeypatch: pytest.Monkey
     ("given", "variable", "namespace"),
     [(None, "arm", "/arm"), ("/", "/arm/", "/arm"), ("/leg", "arm", "/leg"), (None, "", "/")],
 )
-def test_the_namespace_comes_from_the_program_or_the_environment(
+def test_namespace_comes_from_the_program_or_the_environment(
     monkeypatch: pytest.MonkeyPatch, given: str | None, variable: str, namespace: str
 ) -> None:
     monkeypatch.setenv("ROS_NAMESPACE", variable)
@@ -148,7 +148,7 @@ def test_the_namespace_comes_from_the_program_or_the_environment(
         assert node.resolve("a") == f"{namespace.rstrip('/')}/a"
 
 
-def test_a_bad_ros_namespace_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bad_ros_namespace_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_NAMESPACE", "a-b")
     with pytest.raises(rosglass.InvalidNameError, match="ROS_NAMESPACE 'a-b': '-' at position 1"):
         rosglass.connect("ros1://127.0.0.1:1")

@@ -68,7 +68,7 @@ def test_dumped_file_can_be_read(tmp_path):
 
 
 @pytest.mark.parametrize("missing", ["nowhere/robot.yaml", "nowhere"])
-def test_files_that_cannot_be_opened_are_named(tmp_path, missing):
+def test_files_that_cannot_be_opened_are_reported(tmp_path, missing):
     with pytest.raises(ParameterError, match="nowhere"):
         read(tmp_path / missing)
     with pytest.raises(ParameterError, match="nowhere"):

@@ -172,7 +172,7 @@ def test_fifty_calls_are_answered_in_parallel(connect, node):
     assert [call.result(30).sum for call in calls] == list(range(50))
 
 
-def test_a_persistent_client_uses_one_connection_and_others_one_for_each_call(
+def test_persistent_client_uses_one_connection_and_others_one_for_each_call(
     client, persistent, start_robot
 ):
     def answer(sock, _):
@@ -187,7 +187,7 @@ def test_a_persistent_client_uses_one_connection_and_others_one_for_each_call(
     assert robot.headers[0] == expected | ({"persistent": "1"} if persistent else {})
 
 
-def test_a_server_that_keeps_no_connections_serves_persistent_clients_too(
+def test_server_that_keeps_no_connections_serves_persistent_clients_too(
     client, start_robot, eventually
 ):
     start_robot()
@@ -210,7 +210,7 @@ def test_type_unknown_here_is_reported_with_the_fix(node, start_robot, eventuall
         client.call(timeout=0.1)
 
 
-def test_a_definition_that_is_added_later_is_taken(master, connect, start_robot, tmp_path):
+def test_definition_that_is_added_later_is_taken(master, connect, start_robot, tmp_path):
     definition = tmp_path / "acme_srvs" / "srv" / "Dance.srv"
     definition.parent.mkdir(parents=True)
     (tmp_path / "acme_srvs" / "package.xml").write_text("<package><name>acme_srvs</name></package>")
@@ -225,7 +225,7 @@ def test_a_definition_that_is_added_later_is_taken(master, connect, start_robot,
     assert client.type.name == "acme_srvs/srv/Dance"
 
 
-def test_the_version_that_the_server_has_is_taken_where_it_is_known(
+def test_version_that_the_server_has_is_used_where_it_is_known(
     master, connect, start_robot, tmp_path
 ):
     library = Library()
@@ -261,7 +261,7 @@ def test_another_md5_is_refused_naming_both(connect, node, persistent, eventuall
     assert client.problem == ""
 
 
-def test_a_server_of_any_type_is_called(node, start_robot):
+def test_server_of_any_type_is_called(node, start_robot):
     start_robot(reply=TELLS | {"md5sum": "*", "type": "*"})
     assert node.create_service_client("/add", ADD).call().sum == 3
     unknown = node.create_service_client("/add")
@@ -282,7 +282,7 @@ def test_types_of_services_are_listed_once_probed(node, start_robot, connect, ev
     assert node.service_clients("/add") == []
 
 
-def test_the_graph_changes_when_types_become_known(node, start_robot, eventually):
+def test_graph_changes_when_types_become_known(node, start_robot, eventually):
     start_robot()
     seen = []
     node.on_graph_change(lambda: seen.append(node.services().get("/add")))
@@ -312,14 +312,14 @@ def test_servers_are_not_probed_without_interest_in_types(node, master, start_ro
 # -- who is there --------------------------------------------------------------------------------
 
 
-def test_a_master_that_is_not_there_is_named(connect, free_port):
+def test_unreachable_master_is_reported(connect, free_port):
     node = connect("alone", url=f"ros1://127.0.0.1:{free_port}?ip=127.0.0.1")
     client = node.create_service_client("/add", ADD)
     with pytest.raises(rosglass.ServiceUnavailableError, match=f"127.0.0.1:{free_port}"):
         client.call(timeout=0.5)
 
 
-def test_a_host_that_is_not_known_is_named(node, master):
+def test_unknown_host_is_reported(node, master):
     master.offer("/add", 1234, host="robot.invalid")
     client = node.create_service_client("/add", ADD)
     with pytest.raises(rosglass.ServiceUnavailableError, match="ROS_HOSTNAME") as caught:
@@ -328,14 +328,14 @@ def test_a_host_that_is_not_known_is_named(node, master):
 
 
 @pytest.mark.parametrize("uri", ["rosrpc://127.0.0.1", "nonsense", "rosrpc://127.0.0.1:99999"])
-def test_a_place_that_makes_no_sense_is_named(node, master, uri):
+def test_invalid_uri_is_reported(node, master, uri):
     master.services["/add"] = ("/robot", uri, "http://127.0.0.1:1")
     client = node.create_service_client("/add", ADD)
     with pytest.raises(rosglass.ServiceUnavailableError, match="the master's answer for /add"):
         client.call(timeout=1)
 
 
-def test_a_server_that_was_killed_is_explained(client, node, master, free_port, eventually):
+def test_server_that_was_killed_is_explained(client, node, master, free_port, eventually):
     master.offer("/add", free_port)
     eventually(lambda: node.service_servers("/add"))
     master.calls.clear()
@@ -349,7 +349,7 @@ def test_a_server_that_was_killed_is_explained(client, node, master, free_port, 
     assert 0 < lookups < 20, "the master is asked again, but not without pause"
 
 
-def test_a_server_that_was_there_too_briefly_for_the_graph_is_missed_no_longer(
+def test_problem_of_a_server_that_left_before_the_graph_noticed(
     client, master, free_port, eventually
 ):
     state = master.getSystemState("/test")
@@ -361,7 +361,7 @@ def test_a_server_that_was_there_too_briefly_for_the_graph_is_missed_no_longer(
     eventually(lambda: "no server offers /add" in client.problem)
 
 
-def test_a_server_that_comes_back_on_another_port_is_called_there(client, start_robot):
+def test_server_that_comes_back_on_another_port_is_called_there(client, start_robot):
     first = start_robot(lambda sock, _: (receive_request(sock), sock.sendall(response(1))))
     assert client.call().sum == 1
     first.close()
@@ -378,7 +378,7 @@ def test_calls_go_on_while_the_master_is_away(client, master, start_robot):
     master.start()
 
 
-def test_a_service_that_moved_to_another_node_is_called_there(connect, client, eventually):
+def test_service_that_moved_to_another_node_is_called_there(connect, client, eventually):
     old, new = connect("old"), connect("new")
     first = old.create_service_server("/add", ADD, lambda _: {"sum": 1})
     assert client.call().sum == 1
@@ -391,7 +391,7 @@ def test_a_service_that_moved_to_another_node_is_called_there(connect, client, e
     eventually(lambda: client.call().sum == 1)
 
 
-def test_a_call_takes_no_connection_that_is_being_ended(connect, eventually, monkeypatch):
+def test_call_uses_no_closing_connection(connect, eventually, monkeypatch):
     old, new = connect("old"), connect("new")
     client = connect("caller").create_service_client("/add", ADD, persistent=True)
     calls, looked, ending = [], threading.Event(), threading.Event()
@@ -463,7 +463,7 @@ def test_silent_server_times_out_and_may_still_execute(client, start_robot):
     assert client.call(timeout=30).sum == 3
 
 
-def test_a_server_that_goes_in_mid_call_ends_it_at_once(client, start_robot):
+def test_call_ends_at_once_if_its_server_leaves(client, start_robot):
     start_robot(gone)
     with pytest.raises(rosglass.ConnectionLostError, match="may have carried it out or not"):
         client.call(timeout=30)
@@ -514,7 +514,7 @@ def test_incomplete_header_is_reported(client, start_robot, reply, eventually):
     eventually(reported)
 
 
-def test_a_server_that_refuses_is_quoted(client, start_robot):
+def test_refusal_of_a_server_is_quoted(client, start_robot):
     start_robot(reply={"error": "not today"})
     with pytest.raises(
         rosglass.ServiceError, match=r"refuses the call of /add.*not today"
@@ -523,7 +523,7 @@ def test_a_server_that_refuses_is_quoted(client, start_robot):
     assert not isinstance(caught.value, rosglass.ServiceUnavailableError)
 
 
-def test_a_server_that_closes_before_its_header_was_sent_nothing(client, master):
+def test_server_that_closes_before_its_header_gets_no_request(client, master):
     with socket.create_server(("127.0.0.1", 0)) as listener:
         master.offer("/add", listener.getsockname()[1])
 
@@ -541,7 +541,7 @@ def test_a_server_that_closes_before_its_header_was_sent_nothing(client, master)
 # -- giving up and closing -----------------------------------------------------------------------
 
 
-def test_a_cancelled_call_waits_no_more(client, start_robot):
+def test_cancelled_call_stops_waiting(client, start_robot):
     waiting = client.call_async()
     assert waiting.cancel()
     assert client.pending == 0
@@ -723,7 +723,7 @@ def test_exception_is_reported_to_the_caller(connect, client, fails, message, ca
     assert bool(logged) != isinstance(fails, rosglass.ServiceError)
 
 
-def test_a_request_that_makes_no_sense_is_refused(connect, dial):
+def test_malformed_request_is_refused(connect, dial):
     robot = connect("robot")
     seen = []
     robot.create_service_server("/add", ADD, seen.append)
@@ -735,7 +735,7 @@ def test_a_request_that_makes_no_sense_is_refused(connect, dial):
     assert seen == []
 
 
-def test_a_service_has_one_server_in_a_node(node):
+def test_service_has_one_server_in_a_node(node):
     first = node.create_service_server("/add", ADD, add)
     with pytest.raises(rosglass.ServiceError, match="/console offers /add already"):
         node.create_service_server("/add", ADD, add)
@@ -743,7 +743,7 @@ def test_a_service_has_one_server_in_a_node(node):
     node.create_service_server("/add", ADD, add).close()
 
 
-def test_a_server_that_is_made_again_at_once_stays_registered(node, master, eventually):
+def test_server_that_is_recreated_at_once_stays_registered(node, master, eventually):
     """The background unregistration of the old one must not remove the new one."""
     for _ in range(20):
         server = node.create_service_server("/add", ADD, add)
@@ -769,7 +769,7 @@ def test_closing_withdraws_the_service(connect, master, eventually):
     assert master.services == {}
 
 
-def test_a_service_is_registered_again_after_the_master_was_restarted(
+def test_service_is_registered_again_after_the_master_was_restarted(
     connect, master, client, eventually
 ):
     connect("robot").create_service_server("/add", ADD, add)

@@ -116,7 +116,7 @@ def test_other_hosts_may_not(peer: str, caplog: pytest.LogCaptureFixture) -> Non
 
 
 @pytest.mark.parametrize("source", ["127.0.0.1", "127.0.1.1"])
-def test_a_node_of_a_machine_that_is_named_127_0_1_1_is_ended(
+def test_node_of_a_machine_at_127_0_1_1_is_shut_down(
     connect: Callable[..., Any], eventually: Callable[..., Any], master: FakeMaster, source: str
 ) -> None:
     url = master.url.replace("?ip=127.0.0.1", "?ip=127.0.1.1")
@@ -151,7 +151,7 @@ def update_from(peer: str, own: str, topic: Topic) -> None:
 
 
 @pytest.mark.parametrize("peer", [MASTER, f"::ffff:{MASTER}"])
-def test_the_masters_updates_are_believed(peer: str) -> None:
+def test_masters_updates_are_trusted(peer: str) -> None:
     topic = Topic()
     update_from(peer, "192.0.2.7", topic)
     assert topic.publishers == ["http://192.0.2.66:1/"]

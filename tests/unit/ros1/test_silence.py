@@ -24,7 +24,7 @@ def count_looks(monkeypatch):
     return looks
 
 
-def test_a_publisher_that_falls_silent_is_a_problem_until_its_next_message(
+def test_publisher_that_falls_silent_is_a_problem_until_its_next_message(
     connect, eventually, monkeypatch
 ):
     monkeypatch.setattr(arrivals, "_REGULAR_SAMPLES", 2)  # takes ten seconds else
@@ -61,7 +61,7 @@ def test_a_publisher_that_falls_silent_is_a_problem_until_its_next_message(
     eventually(lambda: problems[-2:] == [problem, ""])
 
 
-def test_a_latched_message_is_not_missed(connect, eventually, monkeypatch):
+def test_latched_message_is_not_missed(connect, eventually, monkeypatch):
     monkeypatch.setattr(arrivals, "_REGULAR_SAMPLES", 0)
     robot, cockpit = connect("robot"), connect("cockpit")
     robot.create_publisher("/map", "std_msgs/Int32", LATCHED).publish({"data": 1})

@@ -183,9 +183,7 @@ def test_strange_requests_are_refused(api: Any, node: Ros1Node, head: bytes, sta
     assert api.getPid("/t")[0] == 1
 
 
-def test_a_flood_of_connections_costs_no_more_than_a_hundred_threads(
-    api: Any, node: Ros1Node
-) -> None:
+def test_flood_of_connections_uses_at_most_100_threads(api: Any, node: Ros1Node) -> None:
     socks = [socket.create_connection(place(node), 10) for _ in range(150)]
     try:
         # The oldest make room at once, so that the master gets through.

@@ -53,7 +53,7 @@ def md5_of(name: str, library: Library | None = None) -> str:
     return rosglass.load(name, ros=1, library=library or robot_library()).md5
 
 
-def test_a_message_comes_from_its_publisher(join: Callable[..., Any]) -> None:
+def test_message_definition_is_fetched_from_its_publisher(join: Callable[..., Any]) -> None:
     join("robot", robot_library()).create_publisher("/state", STATE)
     user = join("cockpit")
     with pytest.raises(TypeNotFoundError):
@@ -67,7 +67,7 @@ def test_a_message_comes_from_its_publisher(join: Callable[..., Any]) -> None:
     assert user.create_publisher("/other", STATE).type == found, "its name is enough from now on"
 
 
-def test_a_service_comes_by_its_sum_from_the_library(join: Callable[..., Any]) -> None:
+def test_service_is_found_in_the_library_by_md5(join: Callable[..., Any]) -> None:
     join("robot", robot_library()).create_service_server("/ask", ASK, lambda _: None)
     user = join("cockpit")
     with pytest.raises(TypeNotFoundError, match="ROS 1 servers send no definitions"):
@@ -81,7 +81,7 @@ def test_a_service_comes_by_its_sum_from_the_library(join: Callable[..., Any]) -
         join("other", other).fetch_type(ASK, timeout=30)
 
 
-def test_an_action_comes_from_its_topics(
+def test_action_is_assembled_from_its_topics(
     join: Callable[..., Any], eventually: Callable[..., Any]
 ) -> None:
     robot = join("robot", robot_library())
@@ -234,7 +234,7 @@ class Answering:
         ),
     ],
 )
-def test_publishers_that_answer_nonsense_are_named(
+def test_publishers_that_answer_nonsense_are_reported(
     reply: bytes, message: str, join: Callable[..., Any], master: FakeMaster
 ) -> None:
     odd = Answering(master, "/odd", reply)

@@ -161,7 +161,7 @@ def test_names_types_and_profiles_on_the_wire(client, middleware):
     assert hashes == [rosglass.load(name).rihs01 for name in types]
 
 
-def test_the_server_announces_itself_as_an_action(robot, server):
+def test_server_announces_itself_as_an_action(robot, server):
     fake = robot.fake
     assert robot.actions() == {"/fib": [FIB]}
     assert {replier.info.name for replier in fake.repliers} == {
@@ -261,7 +261,7 @@ def test_status_topic_lists_every_goal_that_has_not_ended(client, peer, code, ev
     assert list(goals[0].result(30).result.sequence) == [1]
 
 
-def test_a_status_that_is_not_known_is_ignored(client, peer):
+def test_status_that_is_unknown_is_ignored(client, peer):
     goal = client.send_goal()
     peer.answer()
     peer.send_status(goal, 0)
@@ -269,7 +269,7 @@ def test_a_status_that_is_not_known_is_ignored(client, peer):
     assert goal.status is ACCEPTED
 
 
-def test_an_acceptance_that_gets_lost_shows_by_the_status(client, peer):
+def test_lost_acceptance_is_known_from_the_status(client, peer):
     goal = client.send_goal(timeout=1.0)
     peer.send_status(goal, 2, sec=9)
     assert goal.acceptance.result(30) is True
@@ -277,7 +277,7 @@ def test_an_acceptance_that_gets_lost_shows_by_the_status(client, peer):
     assert goal.accepted == Time.from_parts(9, 0)
 
 
-def test_a_goal_whose_server_went_is_cancelled_should_it_run(client, peer, eventually):
+def test_goal_of_a_server_that_left_is_cancelled_if_it_still_runs(client, peer, eventually):
     goal = client.send_goal()
     peer.send_goal.reply(1, None, SERVER_LEFT)
     with pytest.raises(rosglass.ConnectionLostError, match="may have carried it out or not"):
@@ -305,7 +305,7 @@ def test_unanswered_goal_times_out_and_is_cancelled(client, peer, eventually):
     assert list(client.goals) == []
 
 
-def test_a_goal_cancelled_before_it_was_accepted_is_cancelled_then(client, peer, eventually):
+def test_goal_cancelled_before_it_was_accepted_is_cancelled_then(client, peer, eventually):
     goal = client.send_goal()
     answer = goal.cancel()
     late = client.send_goal().cancel(timeout=0.02)
@@ -342,7 +342,7 @@ def test_refusals_to_cancel_are_explained(client, peer, code, reason):
     assert goal.status is ACCEPTED
 
 
-def test_a_server_that_never_answers_requests_to_cancel(client, peer):
+def test_server_that_never_answers_requests_to_cancel(client, peer):
     goal = client.send_goal()
     peer.answer()
     with pytest.raises(rosglass.TimeoutError, match=r"did not answer .* within 0\.02 s; some serv"):
@@ -373,7 +373,7 @@ def test_rubbish_is_named_once_per_publisher(client, peer, middleware, caplog, t
 # -- results that do not come easily -------------------------------------------------------------
 
 
-def test_a_result_is_asked_for_again_when_asking_failed(client, peer, impatient, eventually):
+def test_result_is_requested_again_when_asking_failed(client, peer, impatient, eventually):
     goal = client.send_goal()
     peer.answer()
     eventually(lambda: peer.asked)
@@ -386,9 +386,7 @@ def test_a_result_is_asked_for_again_when_asking_failed(client, peer, impatient,
     assert goal.result(30).status is SUCCEEDED
 
 
-def test_a_result_is_asked_for_again_when_the_end_was_announced(
-    client, peer, impatient, eventually
-):
+def test_result_is_requested_again_when_the_end_was_announced(client, peer, impatient, eventually):
     goal = client.send_goal()
     peer.answer()
     eventually(lambda: peer.asked)
@@ -399,7 +397,7 @@ def test_a_result_is_asked_for_again_when_the_end_was_announced(
     assert goal.result(30).status is ABORTED
 
 
-def test_a_result_is_asked_for_again_when_the_server_is_back(client, peer, eventually):
+def test_result_is_requested_again_when_the_server_is_back(client, peer, eventually):
     goal = client.send_goal()
     peer.answer()
     eventually(lambda: peer.asked)
@@ -416,7 +414,7 @@ def test_a_result_is_asked_for_again_when_the_server_is_back(client, peer, event
 
 
 @pytest.mark.parametrize("connected", [True, False])
-def test_a_goal_is_lost_with_its_server(client, peer, middleware, impatient, connected, eventually):
+def test_goal_is_lost_with_its_server(client, peer, middleware, impatient, connected, eventually):
     middleware.become(
         ConnectionState.CONNECTED if connected else ConnectionState.LOST, "cable pulled"
     )
@@ -434,7 +432,7 @@ def test_a_goal_is_lost_with_its_server(client, peer, middleware, impatient, con
     assert list(client.goals) == []
 
 
-def test_a_goal_whose_end_is_known_keeps_it_without_the_result(client, peer, impatient, eventually):
+def test_goal_whose_end_is_known_keeps_it_without_the_result(client, peer, impatient, eventually):
     goal = client.send_goal()
     peer.answer()
     eventually(lambda: peer.asked)
@@ -445,7 +443,7 @@ def test_a_goal_whose_end_is_known_keeps_it_without_the_result(client, peer, imp
     assert goal.status is SUCCEEDED
 
 
-def test_a_restarted_server_does_not_know_the_goal(client, peer, eventually):
+def test_restarted_server_does_not_know_the_goal(client, peer, eventually):
     goal = client.send_goal()
     peer.answer()
     eventually(lambda: peer.asked)
@@ -458,7 +456,7 @@ def test_a_restarted_server_does_not_know_the_goal(client, peer, eventually):
     assert goal.status is LOST
 
 
-def test_a_restarted_server_that_does_not_answer(client, peer, monkeypatch, eventually):
+def test_restarted_server_that_does_not_answer(client, peer, monkeypatch, eventually):
     lost, known = client.send_goal(), client.send_goal()
     peer.answer(1)
     peer.answer(2)
@@ -475,7 +473,7 @@ def test_a_restarted_server_that_does_not_answer(client, peer, monkeypatch, even
     assert known.status is EXECUTING
 
 
-def test_a_result_that_cannot_be_decoded(client, peer, eventually):
+def test_result_that_cannot_be_decoded(client, peer, eventually):
     goal = client.send_goal()
     peer.answer()
     eventually(lambda: peer.asked)
@@ -488,7 +486,7 @@ def test_a_result_that_cannot_be_decoded(client, peer, eventually):
 # -- types ---------------------------------------------------------------------------------------
 
 
-def test_types_that_do_not_fit_are_named(node, middleware, caplog, eventually):
+def test_types_that_do_not_fit_are_reported(node, middleware, caplog, eventually):
     client = node.create_action_client("/fib", FIB)
     for end in middleware.requesters:
         end.linked = True
@@ -506,7 +504,7 @@ def test_types_that_do_not_fit_are_named(node, middleware, caplog, eventually):
 
 
 @pytest.mark.parametrize("part", ["SendGoal", "GetResult", "FeedbackMessage"])
-def test_a_part_with_an_unknown_definition_is_named(node, middleware, part, eventually):
+def test_unknown_definition_of_an_action_part_is_reported(node, middleware, part, eventually):
     client = node.create_action_client("/fib", FIB)
     kind, name = {
         "SendGoal": (SERVER, "send_goal"),
@@ -590,7 +588,7 @@ def test_goals_of_a_server_that_is_replaced_by_another_version(
 # -- the server ----------------------------------------------------------------------------------
 
 
-def test_a_server_that_is_asked_by_hand(node, robot, server, middleware, eventually):
+def test_calls_of_the_action_services(node, robot, server, middleware, eventually):
     """The codes and orders that peers rely on."""
 
     def codes():
@@ -682,7 +680,7 @@ def test_results_are_kept_for_a_while(client, server, node, monkeypatch, eventua
 # -- the end -------------------------------------------------------------------------------------
 
 
-def test_an_incomplete_server_is_named(client, middleware, eventually):
+def test_incomplete_server_is_reported(client, middleware, eventually):
     end = middleware.requesters[0]
     middleware.appear(SERVER, end.info.name, end.info.type, end.info.type_hash)
     problem = (

@@ -60,7 +60,7 @@ def test_only_writers_have_a_lifespan():
     assert cyclone.qos_of(brief, writer=False).profile() == QoS()
 
 
-def test_an_empty_profile_is_ddss_default():
+def test_empty_profile_is_ddss_default():
     profile = cyclone.Qos().profile()
     assert profile.reliability is Reliability.BEST_EFFORT
     assert profile.durability is Durability.VOLATILE
@@ -68,7 +68,7 @@ def test_an_empty_profile_is_ddss_default():
 
 
 @pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
-def test_a_profile_interrupted_at_its_making_frees_nothing(monkeypatch):
+def test_profile_interrupted_at_its_making_frees_nothing(monkeypatch):
     def interrupt():
         raise KeyboardInterrupt
 
@@ -136,7 +136,7 @@ def test_another_version_is_refused(fresh, monkeypatch):
         cyclone.library()
 
 
-def test_a_package_without_library_is_refused(fresh, monkeypatch):
+def test_package_without_library_is_refused(fresh, monkeypatch):
     class Empty:
         version = cyclone.VERSION
         files = ()

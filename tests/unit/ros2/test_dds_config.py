@@ -57,7 +57,7 @@ def test_on_a_network_a_datagram_is_one_packet(monkeypatch):
     assert dds_domain.datagram_size.__wrapped__(()) == 1392
 
 
-def test_the_socket_has_room():
+def test_socket_has_room():
     domain = ours()
     assert domain.find("Internal/SocketReceiveBufferSize").attrib == {
         "min": "default",
@@ -74,7 +74,7 @@ def test_the_socket_has_room():
         ("dds://?range=system_default", None, None, None),
     ],
 )
-def test_the_range_becomes_settings_as_in_rmw_cyclonedds(url, multicast, index, localhost):
+def test_range_becomes_settings_as_in_rmw_cyclonedds(url, multicast, index, localhost):
     domain = ours(url)
     assert domain.findtext("General/AllowMulticast") == multicast
     assert domain.findtext("Discovery/ParticipantIndex") == index
@@ -108,12 +108,12 @@ def test_this_machine_as_a_peer_is_whatever_address_it_uses(peer):
     assert (around.get("AddLocalhost"), len(around)) == ("true", 0)
 
 
-def test_unresolvable_peer_is_named():
+def test_unresolvable_peer_is_reported():
     with pytest.raises(rosglass.ConnectionLostError, match=r"address of peer 'robot\.invalid'"):
         config("dds://robot.invalid")
 
 
-def test_a_name_server_that_does_not_answer_does_not_hang_us(monkeypatch):
+def test_name_server_that_does_not_answer_does_not_block(monkeypatch):
     never = threading.Event()
 
     def look_up(*_):
@@ -147,7 +147,7 @@ LO = '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></In
 LO += "</General></Domain></CycloneDDS>"
 
 
-def test_the_users_own_configuration_comes_last_and_so_wins():
+def test_users_own_configuration_comes_last_and_so_wins():
     whole = config(CYCLONEDDS_URI=LO)
     assert whole.endswith("," + LO)
     assert user_config(whole) == LO
@@ -201,7 +201,7 @@ def test_user_configuration_without_conflict_is_kept(url, own):
     assert user_config(config(url, CYCLONEDDS_URI=own)) == own
 
 
-def test_the_documentations_larger_datagrams_are_those_of_this_machine():
+def test_documentations_larger_datagrams_are_those_of_this_machine():
     (own,) = re.findall(r"^  export CYCLONEDDS_URI='(.*)'$", ROS2_PAGE.read_text(), re.MULTILINE)
     assert own.removesuffix("</General>") in config("dds://?range=localhost")
     assert user_config(config(CYCLONEDDS_URI=own)) == own

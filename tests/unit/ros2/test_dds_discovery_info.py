@@ -41,7 +41,7 @@ def test_sample_survives_a_round_trip_in_both_gid_widths(info, padding):
 
 
 @pytest.mark.parametrize("info", widths(INFO) + widths(EMPTY))
-def test_the_wire_is_what_rosbags_makes_of_the_same_message(info):
+def test_bytes_are_those_of_rosbags(info):
     stores = pytest.importorskip("rosbags.typesys", reason="rosbags is not installed")
     np = pytest.importorskip("numpy")
     store = stores.get_typestore(

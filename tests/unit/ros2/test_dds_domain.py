@@ -74,7 +74,7 @@ def test_refused_configuration_is_explained(own, message, capfd):
 
 
 @pytest.mark.parametrize("own", ["", "<General><Interfaces/></General>"])
-def test_an_interface_that_is_not_there_is_named(own, capfd):
+def test_interface_that_is_missing_is_reported(own, capfd):
     with pytest.raises(rosglass.ConversionError) as error:
         join(
             URL + ("" if own else "&interface=wlan77"),
@@ -86,7 +86,7 @@ def test_an_interface_that_is_not_there_is_named(own, capfd):
     assert capfd.readouterr().err == ""
 
 
-def test_a_domain_that_someone_else_in_this_process_uses_is_joined_with_a_warning(caplog):
+def test_domain_that_other_code_of_this_process_uses_is_joined_with_a_warning(caplog):
     others = cyclone.create_domain(57, "")
     participant = cyclone.create_participant(57, None)
     try:

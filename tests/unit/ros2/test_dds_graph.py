@@ -152,7 +152,7 @@ def test_endpoints_of_unknown_nodes_show_under_their_process(domain, properties,
     assert domain.graph.nodes() == [TALKER]
 
 
-def test_an_endpoint_may_come_before_its_participant(domain):
+def test_endpoint_may_come_before_its_participant(domain):
     prefix = b"\x01\x0f" + bytes(10)
     domain.add(prefix, "rt/chatter")
     assert domain.graph.nodes() == [NodeName("/_dds", prefix.hex())]
@@ -194,7 +194,7 @@ def test_everything_goes_with_the_participant(domain):
     domain.drop(guid)
 
 
-def test_a_participant_that_went_and_came_back_between_two_looks_keeps_its_nodes(domain):
+def test_participant_that_left_and_returned_between_two_polls_keeps_its_nodes(domain):
     robot = domain.join()
     domain.announce(robot, writers(TALKER))
     back = domain.participant(robot, b"enclave=/;")
@@ -211,7 +211,7 @@ ADD = (
 
 @pytest.mark.parametrize("server", [True, False])
 @pytest.mark.parametrize("request_first", [True, False])
-def test_a_service_shows_when_both_its_topics_are_there(domain, server, request_first):
+def test_service_is_in_the_graph_once_both_topics_are(domain, server, request_first):
     robot = domain.join()
     domain.announce(robot, writers(TALKER))
     (request, request_type), (reply, reply_type) = ADD
@@ -239,7 +239,7 @@ def test_a_service_shows_when_both_its_topics_are_there(domain, server, request_
     assert domain.graph.nodes() == [TALKER]
 
 
-def test_a_service_shows_the_hash_of_its_response_too(domain):
+def test_service_shows_the_hash_of_its_response_too(domain):
     robot = domain.join()
     (request, request_type), (reply, reply_type) = ADD
     hashed = {"user_data": b"typehash=RIHS01_q;"}
@@ -297,7 +297,7 @@ def test_our_own_endpoints_show_at_once_and_stay_as_they_were_created(domain):
     assert domain.graph.topics() == {}
 
 
-def test_the_width_of_identities_follows_the_others_but_not_our_kind(domain):
+def test_width_of_identities_follows_other_implementations(domain):
     assert not domain.dds.humble
     wide = domain.join()
     domain.announce(wide, writers(TALKER), humble=True)

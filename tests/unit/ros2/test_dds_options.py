@@ -61,13 +61,13 @@ def test_urls(url, expected):
         ({"CYCLONEDDS_URI": " /etc/c.xml,<General/> "}, {"config": "/etc/c.xml,<General/>"}),
     ],
 )
-def test_the_environment_fills_what_the_url_leaves_out(env, expected):
+def test_environment_fills_what_the_url_leaves_out(env, expected):
     parsed = options("dds://", **env)
     for name in ("domain", "peers", "discovery", "config"):
         assert getattr(parsed, name) == expected.get(name, getattr(DdsOptions(), name)), name
 
 
-def test_the_url_wins_over_the_environment():
+def test_url_wins_over_the_environment():
     env = {"ROS_DOMAIN_ID": "9", "ROS_LOCALHOST_ONLY": "1", "ROS_STATIC_PEERS": "robot"}
     parsed = options("dds://other?domain=2&range=subnet", **env)
     assert (parsed.domain, parsed.discovery) == (2, SUBNET)
@@ -125,7 +125,7 @@ def test_bad_urls_are_refused_with_the_part_that_is_wrong(url, message):
         ({"ROS_STATIC_PEERS": "a b"}, "ROS_STATIC_PEERS: expected host names or IPv4 addresses"),
     ],
 )
-def test_bad_variables_are_named(env, message):
+def test_bad_variables_are_reported(env, message):
     with pytest.raises(rosglass.ConversionError) as error:
         options("dds://", **env)
     assert message in str(error.value)

@@ -123,7 +123,7 @@ def ready(client):
     return client
 
 
-def test_a_reply_is_ready_before_its_client_was_noticed(node, server, monkeypatch):
+def test_reply_is_ready_before_its_client_is_discovered(node, server, monkeypatch):
     unnoticed = {server.ends.reader.entity, server.ends.writer.entity}
 
     def hide(module: Any, name: str) -> None:
@@ -141,7 +141,7 @@ def test_a_reply_is_ready_before_its_client_was_noticed(node, server, monkeypatc
 
 
 @pytest.mark.parametrize("noticed", [True, False])
-def test_a_request_is_carried_out_although_its_client_left_at_once(
+def test_request_is_executed_although_its_client_left_at_once(
     node, server, held, eventually, noticed
 ):
     if noticed:
@@ -170,19 +170,19 @@ def test_nothing_is_sent_that_a_server_just_announced_may_take_for_arguments(
     assert server.got == [1, 3]
 
 
-def test_a_request_in_the_memory_of_another_is_not_taken_for_that(node, server):
+def test_request_at_the_address_of_another_is_not_mistaken_for_it(node, server):
     server.ends.origins.stale = ELSEWHERE
     client = ready(node.create_service_client(SERVICE, ADD))
     assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
 
-def test_a_reply_in_the_memory_of_another_is_not_taken_for_that(node, server, ends):
+def test_reply_at_the_address_of_another_is_not_mistaken_for_it(node, server, ends):
     client = ready(node.create_service_client(SERVICE, ADD))
     ends[-1].origins.stale = ELSEWHERE
     assert client.call({"a": 1, "b": 2}, timeout=30).sum == 2
 
 
-def test_a_request_that_comes_again_is_carried_out_once(server, eventually):
+def test_repeated_request_is_executed_once(server, eventually):
     request = rosglass.load(ADD).request
 
     def receive(client: bytes, number: int, value: int) -> None:
@@ -211,7 +211,7 @@ def test_recorded_origins_are_dropped_with_their_reader():
     two.close()
 
 
-def test_a_senders_guid_decides_whose_sample_it_is():
+def test_senders_guid_decides_whose_sample_it_is():
     whole = Origin(b"\x00\x00\x12\x03", 1, Identity(bytes(16), 1), b"p" * 12)
     part = Origin(b"\x00\x00\x12\x03", 1, None)
     guid = b"p" * 12 + b"\x00\x00\x12\x03"

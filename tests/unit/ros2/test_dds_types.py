@@ -70,7 +70,7 @@ def test_as_many_aliases_as_allowed_lead_to_a_type(wrap: Callable[[Any], Any]) -
 
 @pytest.mark.parametrize("wrap", [lambda kind: kind, sequence], ids=["field", "element"])
 @pytest.mark.parametrize("count", [LIMIT + 1, 450])
-def test_a_longer_chain_is_refused_by_name(count: int, wrap: Callable[[Any], Any]) -> None:
+def test_longer_chain_is_refused_by_name(count: int, wrap: Callable[[Any], Any]) -> None:
     peer = Peer(count, UINT8, wrap)
     with pytest.raises(DefinitionError, match="more than 16 aliases lead to its type") as caught:
         peer.description()
@@ -79,7 +79,7 @@ def test_a_longer_chain_is_refused_by_name(count: int, wrap: Callable[[Any], Any
 
 
 @pytest.mark.parametrize("count", [1, 2, LIMIT, 450])
-def test_a_cycle_of_aliases_is_refused_by_name(count: int) -> None:
+def test_cycle_of_aliases_is_refused_by_name(count: int) -> None:
     peer = Peer(count, identifier(1))
     with pytest.raises(DefinitionError, match="more than 16 aliases lead to its type") as caught:
         peer.description()
@@ -87,6 +87,6 @@ def test_a_cycle_of_aliases_is_refused_by_name(count: int) -> None:
     assert peer.sent <= LIMIT + 2
 
 
-def test_an_alias_of_the_message_itself_is_refused() -> None:
+def test_alias_of_the_message_itself_is_refused() -> None:
     with pytest.raises(DefinitionError, match="alias cannot be a message"):
         describe_struct(identifier(1), Peer(1, UINT8).send)

@@ -35,7 +35,7 @@ def test_nodes_are_sorted_and_named_once(graph):
     assert graph.nodes() == [LISTENER]
 
 
-def test_a_node_shows_by_its_endpoints_alone(graph):
+def test_node_is_in_the_graph_by_its_endpoints_alone(graph):
     graph.put_endpoint("a", endpoint(PUBLISHER, node=LISTENER))
     assert graph.nodes() == [LISTENER]
 

@@ -16,7 +16,7 @@ from rosglass.wires import local
 from rosglass.wires.local import LocalMiddleware
 
 
-def test_a_graph_ends_with_its_last_node():
+def test_graph_ends_with_its_last_node():
     with pytest.raises(rosglass.InvalidNameError):
         rosglass.connect("local://unit", "a b")
     with rosglass.connect("local://unit", "one"), rosglass.connect("local://unit", "two"):

@@ -148,7 +148,7 @@ def test_incomplete_type_names_are_refused(bad):
         ("/", False),
     ],
 )
-def test_a_part_that_begins_with_an_underscore_hides_a_name(name, expected):
+def test_part_that_begins_with_an_underscore_hides_a_name(name, expected):
     assert hidden(name) is expected
 
 

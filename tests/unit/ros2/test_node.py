@@ -58,7 +58,7 @@ def test_repeated_samples_are_delivered_once(node, middleware):
     assert subscription.statistics().received == 1
 
 
-def test_the_type_follows_a_robot_that_comes_back_with_another_one(node, middleware, eventually):
+def test_type_follows_a_robot_that_comes_back_with_another_one(node, middleware, eventually):
     key = middleware.appear(PUBLISHER, "/t", STRING)
     subscription = node.create_subscription("/t")
     eventually(lambda: subscription.type)
@@ -70,7 +70,7 @@ def test_the_type_follows_a_robot_that_comes_back_with_another_one(node, middlew
     assert not second.closed
 
 
-def test_a_given_type_stays_and_others_are_named(node, middleware, eventually):
+def test_given_type_stays_and_others_are_reported(node, middleware, eventually):
     subscription = node.create_subscription("/t", STRING)
     middleware.appear(PUBLISHER, "/t", TWIST)
     problem = eventually(lambda: subscription.problem)
@@ -78,7 +78,7 @@ def test_a_given_type_stays_and_others_are_named(node, middleware, eventually):
     assert subscription.type.name == STRING
 
 
-def test_an_unknown_definition_is_a_problem_until_it_is_added(middleware, eventually, tmp_path):
+def test_unknown_definition_is_a_problem_until_it_is_added(middleware, eventually, tmp_path):
     library = Library()
     node = Ros2Node(middleware, "fake://", "cockpit", library=library)
     middleware.appear(PUBLISHER, "/t", "secret_msgs/msg/Thing")
@@ -113,7 +113,7 @@ def test_unannounced_definition_is_refused_too(node, middleware, eventually):
 
 
 @pytest.mark.parametrize("given", [None, "pkg/msg/T"])
-def test_the_robots_version_of_a_type_is_taken_if_it_is_known(middleware, eventually, given):
+def test_robots_version_of_a_type_is_taken_if_it_is_known(middleware, eventually, given):
     library = Library()
     library.add_text("pkg/msg/T", "int32 new\n")
     ours = rosglass.load("pkg/msg/T", library=library)
@@ -153,7 +153,7 @@ def test_status_changes_are_notified_in_order_and_once(node, middleware, eventua
     assert [s.detail for s in seen] == ["connecting", "lost", "connected"]
 
 
-def test_a_lost_connection_is_logged(node, middleware, eventually, caplog):
+def test_lost_connection_is_logged(node, middleware, eventually, caplog):
     middleware.become(ConnectionState.LOST, "connection to x lost, trying again every second")
     eventually(lambda: "connection to x lost" in caplog.text)
 
@@ -173,7 +173,7 @@ def test_closing_ends_what_the_wire_made(middleware):
     assert middleware.writers[0].closed
 
 
-def test_a_middleware_that_cannot_start_leaves_no_thread(middleware):
+def test_middleware_that_cannot_start_leaves_no_thread(middleware):
     def refuse(graph, changed):
         raise rosglass.ConnectionLostError("no network")
 

@@ -31,7 +31,7 @@ def test_urls(url, expected):
     assert ZenohOptions.parse(url, {}) == expected
 
 
-def test_the_environment_fills_what_the_url_leaves_out():
+def test_environment_fills_what_the_url_leaves_out():
     env = {"ROS_DOMAIN_ID": "9", "ZENOH_SESSION_CONFIG_URI": "/etc/zenoh.json5"}
     options = ZenohOptions.parse("zenoh://r", env)
     assert (options.domain, options.config_file) == (9, "/etc/zenoh.json5")
@@ -71,7 +71,7 @@ def test_bad_urls_are_refused_with_the_part_that_is_wrong(url, message):
     assert message in str(error.value)
 
 
-def test_a_bad_domain_in_the_environment_is_named():
+def test_bad_domain_in_the_environment_is_reported():
     with pytest.raises(rosglass.ConversionError, match="environment: ROS_DOMAIN_ID: expected"):
         ZenohOptions.parse("zenoh://r", {"ROS_DOMAIN_ID": "two"})
 
@@ -142,7 +142,7 @@ def test_unknown_scheme_is_refused_with_the_known_ones(url, message):
 
 
 @pytest.mark.parametrize(("url", "package"), [("dds://", "cyclonedds"), ("zenoh://", "zenoh")])
-def test_a_middleware_that_is_not_installed_says_how_to_get_it(monkeypatch, url, package):
+def test_middleware_that_is_not_installed_says_how_to_get_it(monkeypatch, url, package):
     monkeypatch.setattr("rosglass.connection.find_spec", lambda name: None)
     extra = url.partition(":")[0]
     with pytest.raises(rosglass.UnsupportedError, match=re.escape(install_command(extra))):

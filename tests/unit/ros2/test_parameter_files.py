@@ -59,7 +59,7 @@ VALUES: dict[str, Any] = {
 }
 
 
-def test_a_dump_of_ros2_param_is_read() -> None:
+def test_dump_of_ros2_param_is_read() -> None:
     assert parse(DUMPED).for_node("/foo/test_node") == VALUES
 
 
@@ -67,7 +67,7 @@ def test_dumping_writes_what_ros2_param_writes() -> None:
     assert dump({"/foo/test_node": VALUES}) == DUMPED
 
 
-def test_the_migration_guides_example() -> None:
+def test_migration_guides_example() -> None:
     file = parse(
         "/lidar_ns:\n  lidar_node_name:\n    ros__parameters:\n      lidar_name: foo\n"
         "      id: 10\nimu:\n  ros__parameters:\n    ports: [2438, 2439, 2440]\n"
@@ -82,7 +82,7 @@ def test_the_migration_guides_example() -> None:
     assert file.for_node("/lidar_ns/imu") == {"debug": True}
 
 
-def test_the_design_articles_example_of_precedence() -> None:
+def test_design_articles_example_of_precedence() -> None:
     file = parse(
         "my_node:\n    ros__parameters:\n        my_int: 1\n        my_int: 2\n"
         "        another_int: 1\n        my_float: 1.0\n        another_float: 1.0\n"
@@ -255,7 +255,7 @@ def test_errors_have_file_line_and_column(text: str, message: str) -> None:
         "[{}]",
     ],
 )
-def test_a_list_of_mappings_costs_its_parameter_only(
+def test_list_of_mappings_costs_its_parameter_only(
     value: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     text = f"n:\n  ros__parameters:\n    a: 1\n    b: {{c: {value}, d: 2}}\n"
@@ -272,7 +272,7 @@ def test_a_list_of_mappings_costs_its_parameter_only(
         parse_value(value, "p")
 
 
-def test_a_list_of_mappings_is_skipped_within_yaml_rules() -> None:
+def test_list_of_mappings_is_skipped_within_yaml_rules() -> None:
     for rest in ("*x", "[", "{a: ", "\t"):
         with pytest.raises(ParameterError, match=r"f\.yaml:1:"):
             parse(f"n: {{ros__parameters: {{a: [&x {{}}, {rest}", "f.yaml")
@@ -292,7 +292,7 @@ def test_files_are_written_in_one_go(tmp_path: Path) -> None:
     assert read(str(file)).for_node("/n") == {"a": 2}
 
 
-def test_files_that_cannot_be_used_are_named(tmp_path: Path) -> None:
+def test_files_that_cannot_be_used_are_reported(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"none\.yaml cannot be read: No such file"):
         read(tmp_path / "none.yaml")
     with pytest.raises(ParameterError, match="cannot be written"):

@@ -65,7 +65,7 @@ def test_values_have_a_type(value: Any, kind: ParameterType, plain: Any) -> None
 
 
 @pytest.mark.parametrize("kind", [T.BYTE_ARRAY, T.BOOL_ARRAY, T.INTEGER_ARRAY, T.STRING_ARRAY])
-def test_an_empty_list_keeps_the_type_that_is_known(kind: ParameterType) -> None:
+def test_empty_list_keeps_the_type_that_is_known(kind: ParameterType) -> None:
     assert typed("p", [], kind) == TypedValue(kind, b"" if kind is T.BYTE_ARRAY else [])
 
 
@@ -95,7 +95,7 @@ def test_invalid_value_is_refused(value: Any, message: str) -> None:
         typed("p", value)
 
 
-def test_a_scalar_cannot_become_an_empty_list() -> None:
+def test_scalar_cannot_become_an_empty_list() -> None:
     with pytest.raises(ParameterError, match="is of type string, and cannot become a list"):
         typed("p", [], T.STRING)
 
@@ -132,7 +132,7 @@ def test_values_survive_the_wire(value: TypedValue) -> None:
         assert [type(item) for item in back.value] == [type(i) for i in value.value]  # type: ignore[union-attr]
 
 
-def test_an_unknown_type_is_named() -> None:
+def test_unknown_type_is_reported() -> None:
     message = load("rcl_interfaces/msg/ParameterValue", ros=2).create({"type": 42})
     with pytest.raises(ParameterError, match="parameter 'x' of /a has the type 42"):
         value_from_message(message, "parameter 'x' of /a")

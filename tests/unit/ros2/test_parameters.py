@@ -74,7 +74,7 @@ def test_bad_declarations_are_refused(
     assert "p" not in parameters
 
 
-def test_a_type_without_a_default_is_not_set(parameters: Ros2Parameters) -> None:
+def test_type_without_a_default_is_not_set(parameters: Ros2Parameters) -> None:
     assert parameters.declare("p", None, D(type=T.INTEGER)) is None
     assert parameters.get("p") is None
     with pytest.raises(ParameterError, match="of type integer"):
@@ -102,7 +102,7 @@ def test_types_and_ranges_are_kept(parameters: Ros2Parameters, value: Any, messa
     assert parameters.get("speed") == 2.5
 
 
-def test_an_empty_list_keeps_the_type(parameters: Ros2Parameters) -> None:
+def test_empty_list_keeps_the_type(parameters: Ros2Parameters) -> None:
     parameters.declare("names", ["a"])
     parameters.declare("blob", b"a")
     parameters.set({"names": [], "blob": []})
@@ -138,7 +138,7 @@ def test_read_only_parameters_stay(parameters: Ros2Parameters) -> None:
         lambda p: p.undeclare("Speed"),
     ],
 )
-def test_undeclared_parameter_is_named(
+def test_undeclared_parameter_is_reported(
     parameters: Ros2Parameters, use: Callable[[Ros2Parameters], None]
 ) -> None:
     with pytest.raises(ParameterError, match=r"/arm: parameter 'Speed' is not declared; declare"):
@@ -263,7 +263,7 @@ def test_names_are_found_by_prefix_and_depth(
     assert parameters.find(prefixes, depth) == names
 
 
-def test_a_file_is_given_by_its_path(parameters: Ros2Parameters) -> None:
+def test_file_is_given_by_its_path(parameters: Ros2Parameters) -> None:
     with pytest.raises(ParameterError, match="given by its path, got 5"):
         parameters.load(5)  # type: ignore[arg-type]
 

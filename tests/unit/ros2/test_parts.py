@@ -32,7 +32,7 @@ def picture(**fields):
     return {"height": 300, "width": 1000, "step": 1000, "encoding": "mono8", **fields}
 
 
-def test_the_arrays_of_big_messages_are_not_copied(node, middleware, taking_parts):
+def test_arrays_of_big_messages_are_not_copied(node, middleware, taking_parts):
     publisher = node.create_publisher("/camera", IMAGE)
     for _ in range(3):
         publisher.publish(picture(data=PIXELS))

@@ -70,7 +70,7 @@ def received(node: Ros2Node, topic: str, kind: str) -> list[Any]:
 # -- parameters --------------------------------------------------------------------------------
 
 
-def test_the_services_have_ros_names_types_and_profiles(start, eventually) -> None:
+def test_services_have_ros_names_types_and_profiles(start, eventually) -> None:
     robot = start(namespace="/arm")
     ends = robot.fake.repliers
     eventually(lambda: [end for end in ends if end.info.name.endswith("_atomically")])
@@ -101,7 +101,7 @@ def test_types_are_described_unless_the_parameter_says_otherwise(start, eventual
     assert offered(start("-p", "start_type_description_service:=false", name="quiet")) == []
 
 
-def test_a_callback_that_waits_does_not_hold_up_the_parameters(start, node) -> None:
+def test_waiting_callback_does_not_block_the_parameter_services(start, node) -> None:
     robot = start()
     waits, release = threading.Event(), threading.Event()
     robot.create_timer(0.001, lambda: waits.set() or release.wait(30))
@@ -120,7 +120,7 @@ def test_remotely_set_values_are_validated(start, node) -> None:
     assert client.set({"a": 5})["a"] == (True, "")
 
 
-def test_an_empty_list_for_a_parameter_that_is_not_there(start, node) -> None:
+def test_empty_list_for_a_parameter_that_is_not_there(start, node) -> None:
     start()
     client = node.create_parameter_client("/robot")
     with pytest.raises(ParameterError, match="/robot does not know the types of nix"):
@@ -211,7 +211,7 @@ def test_rules_that_do_not_fit_the_node_are_refused(start) -> None:
 # -- logging -----------------------------------------------------------------------------------
 
 
-def test_the_log_goes_to_rosout_as_ros_2_has_it_and_to_python(start, node, caplog, eventually):
+def test_log_goes_to_rosout_as_ros_2_has_it_and_to_python(start, node, caplog, eventually):
     robot = start(namespace="/arm")
     messages = received(node, "/rosout", LOG)
     with caplog.at_level(logging.INFO):
@@ -240,7 +240,7 @@ def test_levels_come_from_the_command_line(start) -> None:
     assert robot.logger.getChild("arm") is robot.logger.getChild("arm")
 
 
-def test_the_librarys_own_loggers_have_levels_too(start) -> None:
+def test_librarys_own_loggers_have_levels_too(start) -> None:
     logger = logging.getLogger("rosglass.test.levels")
     start("--log-level", "rosglass.test.levels:=debug", own_services=False)
     assert logger.level == logging.DEBUG
@@ -344,7 +344,7 @@ def camera(connect) -> Camera:
     return Camera(connect("camera"))
 
 
-def test_a_lifecycle_node_is_driven(node, camera, eventually) -> None:
+def test_lifecycle_node_is_driven(node, camera, eventually) -> None:
     client = node.create_lifecycle_client("/camera")
     assert client.wait_for_server(30)
     assert client.ready
@@ -388,13 +388,13 @@ def test_impossible_transitions_are_explained(node, camera) -> None:
         client.state()
 
 
-def test_a_node_without_lifecycle_is_named(node) -> None:
+def test_node_without_lifecycle_is_reported(node) -> None:
     client = node.create_lifecycle_client("/unmanaged")
     with pytest.raises(ServiceUnavailableError, match="/unmanaged/get_available_transitions"):
         client.activate(timeout=0.05)
 
 
-def test_a_node_that_cannot_be_finished_leaves_nothing_behind(middleware):
+def test_node_that_fails_to_start_leaves_nothing_behind(middleware):
     threads = set(threading.enumerate())
     wrong = Arguments.parse(["--ros-args", "-p", "use_sim_time:=maybe"])
     with pytest.raises(Error, match="use_sim_time"):

@@ -49,12 +49,12 @@ def test_publishers_do_not_disturb_each_other():
     assert accepted(*samples) == samples
 
 
-def test_a_publisher_that_starts_counting_again_is_not_repeating():
+def test_publisher_that_starts_counting_again_is_not_repeating():
     samples = [(A, 9, 9), (A, 1, 10), (A, 2, 11)]
     assert accepted(*samples, samples[-1]) == samples
 
 
-def test_a_publisher_that_does_not_count_is_judged_by_its_time_stamps():
+def test_publisher_that_does_not_count_is_judged_by_its_time_stamps():
     assert accepted((A, 0, 1), (A, 0, 2), (A, 0, 2)) == [(A, 0, 1), (A, 0, 2)]
 
 

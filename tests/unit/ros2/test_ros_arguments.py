@@ -64,7 +64,7 @@ def test_rules_for_topics_or_services_only() -> None:
     assert services(arguments) == {"/ns/foo": "/ns/bar", "/ns/x": "/ns/y"}
 
 
-def test_the_first_rule_that_matches_counts() -> None:
+def test_first_rule_that_matches_counts() -> None:
     # The example of the design article.
     arguments = parse(
         *("-r", "my_topic:=first", "-r", "my_topic:=second"),
@@ -115,12 +115,12 @@ def test_nodes_are_renamed(rules: list[str], name: str, namespace: str) -> None:
         ("__ns:=", "has no new name"),
     ],
 )
-def test_bad_rules_are_named(rule: str, message: str) -> None:
+def test_bad_rules_are_reported(rule: str, message: str) -> None:
     with pytest.raises(RosArgumentError, match=message):
         parse("-r", rule)
 
 
-def test_a_rule_that_makes_too_long_a_name_is_named_with_its_node() -> None:
+def test_rule_that_makes_too_long_a_name_is_reported_with_its_node() -> None:
     arguments = parse("-r", f"foo:={'x' * 200}")
     with pytest.raises(RosArgumentError, match=r"-r foo:=x+ cannot be applied to node node in /y"):
         topics(arguments, namespace="/" + "y" * 50)
@@ -188,12 +188,12 @@ def test_parameters_of_one_node_win(tmp_path: Path) -> None:
         ("x:=[", "this is not YAML"),
     ],
 )
-def test_bad_parameters_are_named(rule: str, message: str) -> None:
+def test_bad_parameters_are_reported(rule: str, message: str) -> None:
     with pytest.raises(RosArgumentError, match=message):
         parse("-p", rule)
 
 
-def test_bad_files_are_named(tmp_path: Path) -> None:
+def test_bad_files_are_reported(tmp_path: Path) -> None:
     file = tmp_path / "bad.yaml"
     file.write_text("a:\n  ros_parameters: {b: 1}\n  c: 2")
     with pytest.raises(
@@ -228,7 +228,7 @@ def test_log_output_is_switched_by_arguments() -> None:
     assert parse("--disable-external-lib-logs") == Arguments()
 
 
-def test_an_enclave_is_taken_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
+def test_enclave_is_taken_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
     assert parse("-e", "/a/b") == parse("--enclave=/a/b") == Arguments()
     assert "--enclave /a/b has no effect: this node's traffic is not secured" in caplog.text
     with pytest.raises(RosArgumentError, match="--enclave 'a': namespace 'a' is not absolute"):
@@ -254,7 +254,7 @@ def test_options_for_other_loggers_are_taken_with_a_warning(
         (["a:=b"], "unknown option 'a:=b'"),
     ],
 )
-def test_bad_lines_are_named(line: list[str], message: str) -> None:
+def test_bad_lines_are_reported(line: list[str], message: str) -> None:
     with pytest.raises(RosArgumentError, match=message):
         parse(*line)
 

@@ -59,9 +59,7 @@ def answer(total=3):
 # -- calling -------------------------------------------------------------------------------------
 
 
-def test_a_server_that_is_seen_before_it_is_linked_is_called_when_it_is(
-    client, requester, middleware, eventually
-):
+def test_server_in_the_graph_is_called_once_it_is_linked(client, requester, middleware, eventually):
     requester.linked = False
     middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01)
     call = client.call_async({"a": 1})
@@ -116,7 +114,7 @@ def test_clients_of_a_node_share_the_places_of_a_service(node, client, requester
     assert sum(call.done() for call in first_calls) == 4
 
 
-def test_a_blocking_call_waits_for_its_place(client, requester, eventually):
+def test_blocking_call_waits_for_room_in_the_window(client, requester, eventually):
     requester.linked = True
     with concurrent.futures.ThreadPoolExecutor(12) as pool:
         calls = [pool.submit(client.call, {"a": n}) for n in range(12)]
@@ -126,7 +124,7 @@ def test_a_blocking_call_waits_for_its_place(client, requester, eventually):
         assert sorted(call.result(30).sum for call in calls) == list(range(1, 13))
 
 
-def test_a_call_that_found_no_place_says_so(client, requester):
+def test_call_that_found_no_room_in_the_window_reports_it(client, requester):
     requester.linked = True
     held = [client.call_async(timeout=None) for _ in range(8)]
     with pytest.raises(
@@ -226,7 +224,7 @@ def test_middleware_receives_the_timeout_of_a_call(client, requester):
 # -- what does not come --------------------------------------------------------------------------
 
 
-def test_a_cancelled_call_is_not_sent_or_its_reply_dropped(robot, client, node, middleware):
+def test_cancelled_call_is_not_sent_or_its_reply_dropped(robot, client, node, middleware):
     waiting = client.call_async({"a": 1})
     assert waiting.cancel()
     requester = middleware.requesters[0]
@@ -244,7 +242,7 @@ def test_a_cancelled_call_is_not_sent_or_its_reply_dropped(robot, client, node, 
     assert client.pending == 0
 
 
-def test_an_error_in_place_of_a_reply(client, requester):
+def test_error_in_place_of_a_reply(client, requester):
     requester.linked = True
     call = client.call_async()
     requester.reply(1, None, "the arm is off")
@@ -261,7 +259,7 @@ def test_an_error_in_place_of_a_reply(client, requester):
         (b"\7\7\0\0" + bytes(8), "ADD_Response"),
     ],
 )
-def test_a_reply_that_cannot_be_decoded(client, requester, middleware, data, reason):
+def test_reply_that_cannot_be_decoded(client, requester, middleware, data, reason):
     requester.linked = True
     middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01)
     call = client.call_async()
@@ -272,7 +270,7 @@ def test_a_reply_that_cannot_be_decoded(client, requester, middleware, data, rea
     assert "/robot answered the call of /add with bytes that are no" in str(caught.value)
 
 
-def test_an_empty_response_is_taken_in_every_shape(node, middleware):
+def test_empty_response_is_accepted_with_any_padding(node, middleware):
     client = node.create_service_client("/clear", "std_srvs/srv/Empty")
     middleware.requesters[0].linked = True
     for number, body in enumerate((b"", b"\0", b"\0\0\0\0"), 1):
@@ -335,7 +333,7 @@ def test_server_only_keeps_waiting_while_a_server_is_away_for_a_moment(client, r
     assert len(requester.sent) == 2
 
 
-def test_a_server_that_comes_back_soon_keeps_its_calls(client, requester, middleware, eventually):
+def test_server_that_comes_back_soon_keeps_its_calls(client, requester, middleware, eventually):
     changes = []
     client.on_ready_change(changes.append)
     requester.linked = True
@@ -393,7 +391,7 @@ def test_call_ends_when_the_middleware_reports_a_lost_server(client, requester, 
         call.result(0)
 
 
-def test_a_middleware_that_ends_the_call_of_a_server_that_went(client, requester, middleware):
+def test_middleware_that_ends_the_call_of_a_server_that_left(client, requester, middleware):
     requester.linked = True
     key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
     call = client.call_async()
@@ -403,7 +401,7 @@ def test_a_middleware_that_ends_the_call_of_a_server_that_went(client, requester
         call.result(0)
 
 
-def test_a_middleware_that_cannot_send(client, requester, caplog):
+def test_middleware_that_cannot_send(client, requester, caplog):
     requester.linked = True
     for error, expected in (
         (rosglass.ConnectionLostError("no link"), rosglass.ConnectionLostError),
@@ -422,7 +420,7 @@ def test_a_middleware_that_cannot_send(client, requester, caplog):
 # -- types ---------------------------------------------------------------------------------------
 
 
-def test_unavailable_type_is_named(node, middleware, eventually):
+def test_unavailable_type_is_reported(node, middleware, eventually):
     client = node.create_service_client("/x")
     middleware.appear(SERVER, "/x", "nowhere_msgs/srv/Nothing")
     eventually(
@@ -432,7 +430,7 @@ def test_unavailable_type_is_named(node, middleware, eventually):
         client.call(timeout=0.01)
 
 
-def test_several_types_of_one_service_are_named(node, middleware, eventually):
+def test_several_types_of_one_service_are_reported(node, middleware, eventually):
     middleware.appear(SERVER, "/x", ADD, node="one")
     middleware.appear(SERVER, "/x", TRIGGER, node="two")
     client = node.create_service_client("/x")
@@ -441,7 +439,7 @@ def test_several_types_of_one_service_are_named(node, middleware, eventually):
     assert client.type is None
 
 
-def test_a_server_with_another_type_is_named(client, middleware, caplog, eventually):
+def test_server_with_another_type_is_reported(client, middleware, caplog, eventually):
     middleware.requesters[0].linked = True
     middleware.appear(SERVER, "/add", TRIGGER)
     problem = f"/robot offers {TRIGGER} here, not {ADD}: it cannot be called"
@@ -453,7 +451,7 @@ def test_a_server_with_another_type_is_named(client, middleware, caplog, eventua
     eventually(lambda: caplog.text.count(problem) == 1)
 
 
-def test_a_server_with_another_definition_is_named(client, middleware, eventually):
+def test_server_with_another_definition_is_reported(client, middleware, eventually):
     middleware.requesters[0].linked = True
     middleware.appear(SERVER, "/add", ADD, OTHER_HASH)
     problem = (
@@ -463,7 +461,7 @@ def test_a_server_with_another_definition_is_named(client, middleware, eventuall
     assert not client.ready
 
 
-def test_the_version_that_the_server_announces_is_taken(middleware, tmp_path, eventually):
+def test_version_that_the_server_announces_is_taken(middleware, tmp_path, eventually):
     text = "int64 a\nint64 b\nint64 c\n---\nint64 sum\n"
     folder = tmp_path / "example_interfaces" / "srv"
     folder.mkdir(parents=True)
@@ -580,7 +578,7 @@ def test_undecodable_requests_are_logged_once_per_client(robot, client, caplog):
     assert len(replier.failures) == 206
 
 
-def test_a_request_may_come_while_the_server_is_made(robot, monkeypatch):
+def test_request_may_arrive_while_the_server_is_created(robot, monkeypatch):
     """A client that waits for a service may be quicker than who offers it."""
     create = robot.fake.create_replier
     data = rosglass.load(ADD).request.encode({"a": 1, "b": 2})
@@ -639,7 +637,7 @@ def test_another_version_of_the_response_alone_is_named_and_taken(middleware, ev
         eventually(lambda: f"has the hash {OTHER_HASH}" in client.problem)
 
 
-def test_a_second_server_and_strange_clients_are_named(robot, middleware, caplog, eventually):
+def test_second_server_and_incompatible_clients_are_reported(robot, middleware, caplog, eventually):
     server = robot.create_service_server("/add", ADD, add)
     theirs = robot.fake
     theirs.appear(SERVER, "/add", ADD, node="twin")

@@ -68,7 +68,7 @@ def asker(middleware):
 # -- who matches ---------------------------------------------------------------------------------
 
 
-def test_a_publisher_names_subscriptions_of_other_definitions(node, asker, eventually):
+def test_publisher_names_subscriptions_of_other_definitions(node, asker, eventually):
     publisher = node.create_publisher("/t", STRING)
     asker(type_hash=OTHER, node="other")
     problem = eventually(lambda: publisher.problem)
@@ -124,7 +124,7 @@ def test_services_are_reliable_and_volatile_whatever_is_available(node, middlewa
     assert {end.info.qos for end in ends if end.info.name == "/s"} == {QoS(depth=5)}
 
 
-def test_a_publisher_takes_the_limits_that_subscriptions_ask_for(node, asker):
+def test_publisher_takes_the_limits_that_subscriptions_ask_for(node, asker):
     asker(qos=replace(MANUAL, deadline=Duration.from_seconds(2)))
     publisher = node.create_publisher("/t", STRING, QoS.best_available())
     assert publisher.qos.deadline == Duration.from_seconds(2)
@@ -132,9 +132,7 @@ def test_a_publisher_takes_the_limits_that_subscriptions_ask_for(node, asker):
     assert publisher.qos.lease_duration == MANUAL.lease_duration
 
 
-def test_a_publisher_that_comes_later_with_less_is_received_all_the_same(
-    node, middleware, robot, eventually
-):
+def test_later_publisher_that_offers_less_is_received(node, middleware, robot, eventually):
     middleware.matches_qos = True
     subscription = node.create_subscription("/t", STRING, qos=QoS.best_available())
     conflicts = []
@@ -205,7 +203,7 @@ def test_messages_in_time_keep_a_deadline(node, middleware, robot, eventually):
     assert len(events) <= settled + missed + 2, "six more would have come without messages"
 
 
-def test_the_middlewares_word_on_liveliness_is_believed(node, middleware, robot, eventually):
+def test_liveliness_is_what_the_middleware_reports(node, middleware, robot, eventually):
     subscription = node.create_subscription("/t", STRING)
     events = []
     subscription.on_liveliness_change(events.append)
@@ -231,7 +229,7 @@ def test_lost_samples_are_counted_and_notified(node, middleware, eventually):
     assert events == [SamplesLost(5, 5)]
 
 
-def test_a_watchdog_counts_all_that_it_overslept(monkeypatch):
+def test_watchdog_counts_all_missed_periods(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(timers_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
 
@@ -395,7 +393,7 @@ def test_big_endian_bytes_are_turned_round_where_they_cannot_be_passed_on(node, 
         opaque.publish_serialized(big)
 
 
-def test_an_opaque_type_without_hash_takes_every_version(node, middleware, eventually):
+def test_opaque_type_without_hash_takes_every_version(node, middleware, eventually):
     subscription = node.create_subscription("/t", OpaqueType(SECRET))
     reader = middleware.readers[0]
     for version in ("", HASH, OTHER):
@@ -445,9 +443,7 @@ def test_publishers_with_different_versions_are_all_understood(
     assert subscription.take().message().old == 2
 
 
-def test_a_robot_that_comes_back_with_another_version_is_understood(
-    versions, middleware, eventually
-):
+def test_robot_that_returns_with_another_version_is_received(versions, middleware, eventually):
     node, ours, theirs = versions
     key = middleware.appear(PUBLISHER, "/t", "pkg/msg/T", ours.rihs01)
     subscription = node.create_subscription("/t")
@@ -489,7 +485,7 @@ def test_undefined_version_is_handed_on_as_bytes_beside_the_others(
     assert subscription.take().message().new == 1
 
 
-def test_a_name_that_only_the_robot_knows_is_enough_once_it_is_seen(
+def test_type_name_of_the_robot_alone_is_enough_once_it_is_announced(
     lost_node, middleware, robot, eventually
 ):
     with pytest.raises(rosglass.TypeNotFoundError):
@@ -527,7 +523,7 @@ def test_gids_of_closed_publishers_are_not_kept_for_ever(node):
     assert len(kept) == 1000
 
 
-def test_a_publisher_with_the_gid_of_a_closed_one_stays_the_nodes_own(node):
+def test_publisher_with_the_gid_of_a_closed_one_belongs_to_the_node(node):
     core = core_of(node)
     core.add_gid(b"again")
     core.retire_gid(b"again")

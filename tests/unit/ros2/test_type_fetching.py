@@ -99,7 +99,7 @@ def answer(node: Ros2Node, respond: Callable[[Any], Any]) -> None:
     )
 
 
-def test_a_topic_is_read_with_the_definition_of_its_publisher(
+def test_topic_is_read_with_the_definition_of_its_publisher(
     join: Callable[..., Ros2Node], eventually: Callable[..., Any]
 ) -> None:
     library = robot_library()
@@ -184,7 +184,7 @@ def test_asyncio_and_callbacks(
     assert eventually(lambda: done)[0].name == STATE
 
 
-def test_a_node_that_appears_later_is_asked(join: Callable[..., Ros2Node]) -> None:
+def test_node_that_appears_later_is_queried(join: Callable[..., Ros2Node]) -> None:
     user = join("cockpit", serves=False)
     promise = user.fetch_type_async(STATE, timeout=10)
     join("robot", robot_library())
@@ -192,7 +192,7 @@ def test_a_node_that_appears_later_is_asked(join: Callable[..., Ros2Node]) -> No
     assert promise.result(30).rihs01 == hash_of(STATE)
 
 
-def test_a_node_that_appears_late_has_time_to_show_its_service(
+def test_node_that_appears_late_has_time_to_show_its_service(
     join: Callable[..., Ros2Node], eventually: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The time that the graph has to become complete begins anew with each node."""
@@ -237,7 +237,7 @@ def test_local_types_are_taken_when_the_robot_has_the_same(join: Callable[..., R
     assert user.fetch_type("std_msgs/msg/Bool").name == "std_msgs/msg/Bool"
 
 
-def test_the_robots_version_of_a_local_type(join: Callable[..., Ros2Node]) -> None:
+def test_robots_version_of_a_local_type(join: Callable[..., Ros2Node]) -> None:
     robot = Library(prefer="wire")
     robot.add_text("std_msgs/msg/String", "string data\nuint8 urgency")
     join("robot", robot)
@@ -288,7 +288,7 @@ def test_bad_arguments(
         user.fetch_type(**arguments)
 
 
-def test_a_publisher_without_the_service_is_named(
+def test_publisher_without_the_service_is_reported(
     join: Callable[..., Ros2Node], eventually: Callable[..., Any]
 ) -> None:
     user = join("cockpit", serves=False)
@@ -302,7 +302,7 @@ def test_a_publisher_without_the_service_is_named(
         user.fetch_type(STATE)
 
 
-def test_a_publisher_without_hash_is_named(
+def test_publisher_without_hash_is_reported(
     join: Callable[..., Ros2Node], eventually: Callable[..., Any]
 ) -> None:
     user = join("cockpit", serves=False)
@@ -319,7 +319,7 @@ def test_a_publisher_without_hash_is_named(
     assert subscription.type.rihs01 == hash_of(STATE)
 
 
-def test_the_second_node_is_asked_when_the_first_fails(join: Callable[..., Ros2Node]) -> None:
+def test_second_node_is_queried_when_the_first_fails(join: Callable[..., Ros2Node]) -> None:
     answer(join("first", serves=False), lambda _: NO)
     join("second", robot_library())
     user = join("cockpit", serves=False)
@@ -563,7 +563,7 @@ def test_nothing_is_left_behind(
     user.fetch_type(ASK)
 
 
-def test_a_message_that_is_a_service_is_not_asked_for_for_ever(
+def test_type_that_is_a_service_is_not_requested_forever(
     join: Callable[..., Ros2Node], eventually: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A confused publisher: its type exists, but cannot be published."""

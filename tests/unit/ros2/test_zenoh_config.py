@@ -31,7 +31,7 @@ def rmw_file(tmp_path):
     return str(file)
 
 
-def test_a_session_is_shy_by_default():
+def test_session_stays_on_this_machine_by_default():
     config, address = session_config(ZenohOptions("localhost", 8000))
     assert address == "tcp/localhost:8000"
     assert setting(config, "mode") == "peer"
@@ -47,7 +47,7 @@ def test_without_a_host_it_is_this_machine():
 
 
 @pytest.mark.parametrize("host", ["robot", "10.0.0.7", "fe80::7"])
-def test_a_session_is_a_client_of_another_machine(host):
+def test_session_is_a_client_of_another_machine(host):
     config, _ = session_config(ZenohOptions(host))
     assert setting(config, "mode") == "client"
     assert setting(session_config(ZenohOptions(host, mode="peer"))[0], "mode") == "peer"
@@ -79,7 +79,7 @@ def test_every_session_has_an_id_of_its_own_without_leading_zeros():
     assert all(len(i) == 32 and i[0] != "0" for i in ids)
 
 
-def test_a_configuration_file_decides_what_the_url_leaves_open(rmw_file):
+def test_configuration_file_fills_what_the_url_leaves_out(rmw_file):
     config, address = session_config(ZenohOptions(config_file=rmw_file))
     assert address == "tcp/far:7447"
     assert setting(config, "mode") == "client"
@@ -88,7 +88,7 @@ def test_a_configuration_file_decides_what_the_url_leaves_open(rmw_file):
     assert setting(config, "timestamping/enabled") is True, "latched publishers need it"
 
 
-def test_the_url_wins_over_the_configuration_file(rmw_file):
+def test_url_wins_over_the_configuration_file(rmw_file):
     options = ZenohOptions(
         "near", mode="peer", shared_memory=False, config_file=f"file://{rmw_file}"
     )
@@ -98,14 +98,14 @@ def test_the_url_wins_over_the_configuration_file(rmw_file):
     assert setting(config, "transport/shared_memory/enabled") is False
 
 
-def test_a_file_without_addresses_is_named_so(tmp_path):
+def test_file_without_addresses_is_reported(tmp_path):
     file = tmp_path / "x.json5"
     file.write_text("{mode: 'peer'}")
     assert session_config(ZenohOptions(config_file=str(file)))[1].startswith("any address")
 
 
 @pytest.mark.parametrize("content", [None, "{", "{mode: 'nonsense'}", "{no_such_setting: 1}"])
-def test_a_bad_configuration_file_is_named(tmp_path, content):
+def test_bad_configuration_file_is_reported(tmp_path, content):
     file = tmp_path / "bad.json5"
     if content is not None:
         file.write_text(content)
@@ -122,7 +122,7 @@ def test_router_listens_only_where_configured():
     assert setting(config, "scouting/multicast/enabled") is False
 
 
-def test_a_router_with_a_file_without_addresses_is_not_open(tmp_path):
+def test_router_with_a_file_without_addresses_is_not_open(tmp_path):
     file = tmp_path / "router.json5"
     file.write_text("{ transport: { auth: { usrpwd: { dictionary_file: '/users' } } } }")
     assert setting(router_config(None, str(file)), "listen/endpoints") == ["tcp/127.0.0.1:7447"]
@@ -150,7 +150,7 @@ def test_zenohs_own_source_is_not_quoted():
         ("the robot", "the robot"),
     ],
 )
-def test_a_url_is_shown_without_its_password(url, shown):
+def test_url_is_shown_without_its_password(url, shown):
     assert shown_url(url) == shown
 
 
@@ -202,7 +202,7 @@ def test_users_and_certificates_by_url(tmp_path):
         ("tls=1", "tls: expected one of true, false"),
     ],
 )
-def test_options_of_tls_that_contradict_are_named(options, message):
+def test_options_of_tls_that_contradict_are_reported(options, message):
     with pytest.raises(rosglass.ArgumentError, match=message):
         ZenohOptions.parse(f"zenoh://robot?{options}", {})
 
@@ -222,7 +222,7 @@ def test_tls_needs_a_host_beside_a_file(rmw_file):
         ("mode: 'client'", "tcp/near:7447"),
     ],
 )
-def test_a_host_is_connected_to_as_the_file_connects(tmp_path, settings, address):
+def test_host_is_connected_to_as_the_file_connects(tmp_path, settings, address):
     file = tmp_path / "session.json5"
     file.write_text(f"{{ {settings} }}")
     given = ZenohOptions("near", config_file=str(file))

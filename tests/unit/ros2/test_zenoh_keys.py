@@ -52,7 +52,7 @@ def test_node_token():
     assert Token.parse(root.key()) == root
 
 
-def test_a_publisher_token_written_by_a_peer():
+def test_publisher_token_written_by_a_peer():
     token = Token.parse(SEEN)
     assert token.domain == 0
     assert token.session == SESSION

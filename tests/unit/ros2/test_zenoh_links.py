@@ -41,7 +41,7 @@ class FakeChannel:
         return None if self.state == "open" else "Timeout"
 
 
-def test_a_router_that_answers_is_asked_again():
+def test_router_that_answers_is_queried_again():
     heartbeat, session = Heartbeat("key"), FakeSession()
     for now in range(10):
         heartbeat.beat(session, float(now))
@@ -50,7 +50,7 @@ def test_a_router_that_answers_is_asked_again():
     assert len(session.questions) == 10
 
 
-def test_a_router_that_owes_an_answer_is_silent_until_it_answers():
+def test_router_is_silent_until_it_answers():
     heartbeat, session = Heartbeat("key"), FakeSession()
     silent = []
     for now in range(8):
@@ -67,7 +67,7 @@ def test_a_router_that_owes_an_answer_is_silent_until_it_answers():
     assert not heartbeat.silent
 
 
-def test_a_question_whose_time_is_over_is_asked_again_and_the_router_stays_silent():
+def test_query_that_timed_out_is_repeated_and_the_router_stays_silent():
     heartbeat, session = Heartbeat("key"), FakeSession()
     heartbeat.beat(session, 0.0)
     heartbeat.beat(session, 5.0)
@@ -79,7 +79,7 @@ def test_a_question_whose_time_is_over_is_asked_again_and_the_router_stays_silen
     assert not heartbeat.silent
 
 
-def test_a_router_that_sends_tokens_is_not_silent_though_its_answer_queues():
+def test_router_that_sends_tokens_is_not_silent_though_its_answer_queues():
     heartbeat, session = Heartbeat("key"), FakeSession()
     for now in range(10):
         heartbeat.on_received(float(now))

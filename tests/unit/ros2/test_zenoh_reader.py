@@ -57,7 +57,7 @@ class Drain:
         self.interval_ns = 100_000_000
 
 
-def test_a_reader_is_closed_while_the_drain_takes_its_samples():
+def test_reader_is_closed_while_the_drain_takes_its_samples():
     subscriber, closing, failed = Subscriber(), threading.Event(), []
     collected = _Collected(Session(subscriber), "key", 10, print, Drain(closing))
 
@@ -81,7 +81,7 @@ def test_a_reader_is_closed_while_the_drain_takes_its_samples():
     assert subscriber.undeclared
 
 
-def test_a_reader_closed_while_its_samples_change_their_way_ends_each_source_once(monkeypatch):
+def test_reader_closed_while_it_changes_its_mode_ends_each_source_once(monkeypatch):
     calls = []
 
     class Source:
@@ -121,7 +121,7 @@ def test_a_reader_closed_while_its_samples_change_their_way_ends_each_source_onc
         (ZenohOptions(humble=True), "RIHS01_" + "a" * 64),
     ],
 )
-def test_a_reader_declares_the_key_of_its_definition(options, type_hash):
+def test_reader_declares_the_key_of_its_definition(options, type_hash):
     """Zenoh handles each message on a key that no entity has in twice the time."""
     session = Session(Subscriber())
     owner = SimpleNamespace(options=options, forget=lambda _: None, recycle=lambda _: None)

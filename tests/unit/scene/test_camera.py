@@ -30,7 +30,7 @@ def from_above(scale: float = 20.0, angle: float = 0.0) -> Camera:
 CAMERAS = [looking((4, -3, 5), (1, 1, 0)), from_above(20, 0.4)]
 
 
-def test_the_focus_is_seen_in_the_middle() -> None:
+def test_focus_is_seen_in_the_middle() -> None:
     x, y, depth = looking((4, -3, 5), (1, 1, 0)).project((1, 1, 0))
     assert (x, y) == pytest.approx((400, 300))
     assert depth == pytest.approx(math.sqrt(9 + 16 + 25))
@@ -46,13 +46,13 @@ def test_right_and_up_are_right_and_up() -> None:
     assert edge.y == pytest.approx(0, abs=1e-9)
 
 
-def test_a_scale_is_units_of_the_item_per_metre() -> None:
+def test_scale_is_units_of_the_item_per_metre() -> None:
     x, y, _ = from_above(20).project((2, 4, 0))
     assert (x, y) == pytest.approx((420, 260))
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_the_ray_of_a_place_leads_back_to_the_point(camera: Camera) -> None:
+def test_ray_of_a_place_leads_back_to_the_point(camera: Camera) -> None:
     for point in ((0.0, 0.0, 0.0), (2.0, 1.0, 1.5), (1.0, -1.0, -1.0)):
         clip = camera.projection @ camera.view @ (*point, 1)
         assert 0 < (clip[2] / clip[3] + 1) / 2 < 1
@@ -64,7 +64,7 @@ def test_the_ray_of_a_place_leads_back_to_the_point(camera: Camera) -> None:
         assert np.linalg.norm(direction) == pytest.approx(1)
 
 
-def test_the_near_plane_is_at_depth_minus_1_and_far_away_is_1() -> None:
+def test_near_plane_is_at_depth_minus_1_and_far_away_is_1() -> None:
     camera = looking((-5, 0, 0), (0, 0, 0))
     near = camera.projection @ camera.view @ (-5 + camera.near, 0, 0, 1)
     assert near[2] / near[3] == pytest.approx(-1)
@@ -109,7 +109,7 @@ def test_equal_cameras_are_equal() -> None:
 # From one camera to another
 
 
-def test_an_animation_begins_and_ends_at_its_cameras() -> None:
+def test_animation_begins_and_ends_at_its_cameras() -> None:
     a, b = CAMERAS[0], looking((-4, 2, 8), (0, 1, 1))
     assert interpolate(a, b, 0) == a
     assert interpolate(a, b, 1) == b
@@ -118,7 +118,7 @@ def test_an_animation_begins_and_ends_at_its_cameras() -> None:
     assert late.pose == pytest.approx(b.pose, abs=1e-6)
 
 
-def test_an_animation_turns_about_what_is_seen_and_never_passes_through_it() -> None:
+def test_animation_turns_about_the_focus_and_never_passes_through_it() -> None:
     a, b = looking((5, 0.1, 1), (0, 0, 0)), looking((-10, 0, 1), (0, 0, 0))
     for share in np.linspace(0.05, 0.95, 10):
         camera = interpolate(a, b, share)
@@ -132,7 +132,7 @@ def test_an_animation_turns_about_what_is_seen_and_never_passes_through_it() -> 
     )
 
 
-def test_an_animation_to_a_map_ends_with_what_the_map_shows() -> None:
+def test_animation_to_a_map_ends_with_what_the_map_shows() -> None:
     a, b = looking((4, -3, 5), (1, 1, 0)), from_above(20, 0.3)
     for start, goal in ((a, b), (b, a)):
         half = interpolate(start, goal, 0.5)
@@ -142,7 +142,7 @@ def test_an_animation_to_a_map_ends_with_what_the_map_shows() -> None:
         assert almost.project(point)[:2] == pytest.approx(b.project(point)[:2], abs=1e-3)
 
 
-def test_an_animation_between_maps_stays_a_map() -> None:
+def test_animation_between_maps_stays_a_map() -> None:
     a, b = from_above(10, 0.0), from_above(40, 1.0)
     half = interpolate(a, b, 0.5)
     assert half.is_orthographic
@@ -151,7 +151,7 @@ def test_an_animation_between_maps_stays_a_map() -> None:
     assert math.atan2(right[1], right[0]) == pytest.approx(0.5)
 
 
-def test_a_pinhole_camera_sees_points_where_its_matrix_projects_them() -> None:
+def test_pinhole_camera_sees_points_where_its_matrix_projects_them() -> None:
     camera = PinholeCamera(np.eye(4), (400, 300), focal=(200, 220), centre=(190, 140))
     seen = camera.project((0.5, -0.3, -2))
     assert (seen.x, seen.y) == pytest.approx((200 * 0.25 + 190, 220 * 0.15 + 140))

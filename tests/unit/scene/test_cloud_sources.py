@@ -63,7 +63,7 @@ OLD: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("ros", [0, 1, 2])
-def test_the_old_point_cloud(ros: int) -> None:
+def test_legacy_point_cloud(ros: int) -> None:
     cloud = cloud_from_point_cloud(message("PointCloud", OLD, ros) if ros else OLD)
     assert cloud.positions()[0].tolist() == [1, 2, 3]
     assert cloud.finite_count == 1
@@ -74,7 +74,7 @@ def test_the_old_point_cloud(ros: int) -> None:
     assert "'x' is in use" in cloud.warnings[1]
 
 
-def test_an_empty_or_strange_old_point_cloud() -> None:
+def test_empty_or_malformed_legacy_point_cloud() -> None:
     assert cloud_from_point_cloud({"points": [], "channels": []}).point_count == 0
     many = [{"name": f"c{i}", "values": []} for i in range(300)]
     assert "300 channels" in cloud_from_point_cloud({"points": [], "channels": many}).warnings[0]
@@ -108,7 +108,7 @@ def scan(ranges: list[float], intensities: list[float] = [], **changes: Any) -> 
 
 
 @pytest.mark.parametrize("ros", [1, 2])
-def test_a_scan_becomes_points_within_its_limits(ros: int) -> None:
+def test_scan_becomes_points_within_its_limits(ros: int) -> None:
     ranges = [2.0, 0.4, 3.0, 10.0, 0.5, nan, inf, -inf]
     received = message("LaserScan", scan(ranges, [float(i) for i in range(8)]), ros)
     cloud = cloud_from_laser_scan(received)
@@ -126,7 +126,7 @@ def test_infinite_limits_and_wrong_numbers_of_intensities() -> None:
     assert cloud_from_laser_scan(scan([])).point_count == 0
 
 
-def test_the_motion_during_a_scan() -> None:
+def test_motion_during_a_scan() -> None:
     received = scan([2.0] * 5, angle_increment=0.0)
     start = Transform((0, 0, 0), (0, 0, 0, 1))
     # It moves by 4 m along y and turns by 180 degrees about z.
@@ -220,7 +220,7 @@ def test_binning_and_region_of_the_calibration() -> None:
         ("mono8", 1, [0x000000, 0x020202, 0x070707]),
     ],
 )
-def test_a_color_image_colors_the_points(encoding: str, channels: int, colors: list[int]) -> None:
+def test_color_image_colors_the_points(encoding: str, channels: int, colors: list[int]) -> None:
     pixels = np.arange(8 * channels, dtype=np.uint8).reshape(2, 4, channels)
     cloud = cloud_from_depth_image(image(DEPTH, "16UC1"), camera(), image(pixels, encoding))
     assert cloud.values("rgb").tolist() == colors

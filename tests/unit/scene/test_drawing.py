@@ -32,7 +32,7 @@ def test_lines_beside_a_gap_end_there() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_a_strip_of_less_than_two_points_has_no_lines(count: int) -> None:
+def test_strip_of_less_than_two_points_has_no_lines(count: int) -> None:
     lines = Lines()
     lines.set_strip(POINTS[:count])
     assert lines.count == 0
@@ -47,14 +47,14 @@ def test_shapes_are_seen_from_outside(shape: Shape) -> None:
     assert len(np.unique(shape.rows["uv"], axis=0)) > 3
 
 
-def test_a_mirrored_shape_is_seen_from_the_other_side() -> None:
+def test_mirrored_shape_is_seen_from_the_other_side() -> None:
     shape = Shape([(0, 0, 0), (1, 0, 0), (0, 1, 0)], one_sided=True)
     assert shape.mirrored().faces.tolist() == [[2, 1, 0]]
     assert shape.faces.tolist() == [[0, 1, 2]]
     assert shape.mirrored().one_sided
 
 
-def test_the_box_around_a_mesh_is_found_once_for_all_frames() -> None:
+def test_box_around_a_mesh_is_found_once_for_all_frames() -> None:
     mesh = Mesh(BOX)
     box = mesh.bounds()
     assert box is not None

@@ -438,7 +438,7 @@ SEVERAL = "".join(
         ("x", {"zz": "zz-m", "a": "nope"}, (0, 1, 0)),
     ],
 )
-def test_a_material_that_is_not_bound(
+def test_material_that_is_not_bound(
     symbol: str, bound: dict[str, str], color: tuple[float, ...]
 ) -> None:
     bindings = "".join(
@@ -478,7 +478,7 @@ def test_too_many_triangles(monkeypatch: pytest.MonkeyPatch) -> None:
             load_mesh(data, name)
 
 
-def test_a_count_that_lies_takes_no_memory() -> None:
+def test_wrong_count_allocates_no_memory() -> None:
     lie = bytes(80) + struct.pack("<I", 0xFFFFFFFF) + bytes(5000)
     tracemalloc.start()
     with pytest.raises(MeshError, match=r"5084 bytes, too few for 4294967295 triangles"):
@@ -706,7 +706,7 @@ def test_ply_and_off() -> None:
         load_mesh(PLY.replace("3 0 1 2", "3 0 1 7").encode(), "a.ply")
 
 
-def test_a_format_that_needs_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_format_whose_library_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "trimesh", None)
     with pytest.raises(UnsupportedError, match=r"a\.glb: glb files need trimesh: pip install"):
         load_mesh(b"glTF", "a.glb")
@@ -759,7 +759,7 @@ def forbid_parsing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(meshes, "_parsed", lambda *_: pytest.fail("it was parsed again"))
 
 
-def test_the_cache_returns_what_was_parsed(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cache_returns_parsed_mesh(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     materials = effect('<diffuse><texture texture="image"/></diffuse>')
     materials += '<image id="image"><init_from>wood.png</init_from></image>'
     data = collada(node(material="effect-m") + node("<scale>2 2 2</scale>"), materials=materials)
@@ -775,7 +775,7 @@ def test_the_cache_returns_what_was_parsed(cache: Path, monkeypatch: pytest.Monk
     assert same(meshes.MeshCache(os.fspath(cache)).get("embedded") or (), embedded)
 
 
-def test_the_cache_follows_the_materials_of_obj_files(cache: Path, tmp_path: Path) -> None:
+def test_cache_follows_the_materials_of_obj_files(cache: Path, tmp_path: Path) -> None:
     file = tmp_path / "box.obj"
     file.write_text(OBJ)
     (tmp_path / "box.mtl").write_text(MTL)
@@ -812,7 +812,7 @@ def test_damaged_entries_are_parsed_again(cache: Path, damage: str) -> None:
     assert same(meshes.MeshCache(os.fspath(cache)).get(entry.stem) or (), parsed)
 
 
-def test_a_compressed_entry_is_not_unpacked(cache: Path) -> None:
+def test_compressed_entry_is_not_unpacked(cache: Path) -> None:
     parsed = load_mesh_cached(collada(), "a.dae")
     (entry,) = cache.iterdir()
     arrays = dict(np.load(entry)) | {"positions0": np.zeros((1 << 22, 3), np.float32)}
@@ -864,7 +864,7 @@ def test_many_threads_write_the_same_entry(cache: Path) -> None:
     assert not failed
 
 
-def test_a_folder_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_folder_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     assert load_mesh_cached(stl(TRIANGLE), "a.stl")[0].triangles == 1

@@ -11,7 +11,7 @@ from rosglass.scene.render.scene_tree import Group
 from rosglass.scene.view_controllers.views import OrbitView
 
 
-def test_a_ray_does_not_pass_between_two_triangles() -> None:
+def test_ray_does_not_pass_between_two_triangles() -> None:
     box = Mesh(BOX)
     box.owner = "box"
     camera = OrbitView().camera(400, 300)
@@ -31,7 +31,7 @@ def test_a_ray_does_not_pass_between_two_triangles() -> None:
         ("below", {"left", "right", "below"}),
     ],
 )
-def test_a_text_is_picked_where_it_is_drawn(align: str, found: set[str]) -> None:
+def test_text_is_picked_where_it_is_drawn(align: str, found: set[str]) -> None:
     labels = Labels(in_pixels=True, align=align)
     labels.owner = "text"
     labels.set_texts(["a long text"], [(0, 0, 0)], 40.0)

@@ -75,7 +75,7 @@ def test_equal_layouts_are_equal() -> None:
     assert cloud().layout != cloud(point_step=16).layout
 
 
-def test_a_wrong_row_step_is_ignored_if_there_is_no_padding() -> None:
+def test_wrong_row_step_is_ignored_if_there_is_no_padding() -> None:
     for row_step in (0, 3, 1000):
         found = changed(width=3, height=2, row_step=row_step)
         assert found.layout.row_step == 36
@@ -83,7 +83,7 @@ def test_a_wrong_row_step_is_ignored_if_there_is_no_padding() -> None:
         assert f"row_step is {row_step}" in found.warnings[0]
 
 
-def test_a_cloud_without_points_may_lack_everything() -> None:
+def test_cloud_without_points_needs_no_fields() -> None:
     for changes in ({"width": 0}, {"height": 0}, {"width": 0, "row_step": 77, "point_step": 0}):
         found = changed(data=b"", fields=[], **changes)
         assert (found.point_count, found.finite_count, found.bounds()) == (0, 0, None)
@@ -106,7 +106,7 @@ def test_padding_may_have_one_name_several_times() -> None:
     assert Cloud.from_message(message).layout.channels == ["_", "x", "y", "z"]
 
 
-def test_a_count_of_0_is_1() -> None:
+def test_count_of_0_is_1() -> None:
     message = point_cloud2(random_points(2))
     for field in message["fields"]:
         field["count"] = 0
@@ -221,7 +221,7 @@ def velodyne(count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     return point_cloud2(columns), columns
 
 
-def test_a_22_byte_velodyne_is_repacked() -> None:
+def test_22_byte_velodyne_is_repacked() -> None:
     message, columns = velodyne(50)
     assert message["point_step"] == 22
     found = Cloud.from_message(message)
@@ -259,7 +259,7 @@ def test_layouts_that_the_gpu_cannot_read_are_repacked(name: str) -> None:
     assert np.allclose(found.bounds(), (expected.min(0), expected.max(0)))
 
 
-def test_a_channel_at_an_odd_offset_is_repacked() -> None:
+def test_channel_at_an_odd_offset_is_repacked() -> None:
     columns = random_points(3) | {"intensity": np.array([1, 2, 3], np.float32)}
     found = cloud(columns, offsets={"intensity": 13}, point_step=20)
     assert channel(found.vertex_data(INTENSITY)).tolist() == [1, 2, 3]
@@ -324,7 +324,7 @@ def test_invalid_points_are_counted_and_have_no_bounds() -> None:
     assert nothing.axis_range((0, 0, 1)) is None
 
 
-def test_the_largest_finite_positions_do_not_count_as_infinite() -> None:
+def test_largest_finite_positions_do_not_count_as_infinite() -> None:
     largest = np.float32(3e38)
     found = cloud({name: np.array([largest, -largest], np.float32) for name in "xyz"})
     assert found.finite_count == 2
@@ -398,7 +398,7 @@ def test_points_at_one_place_can_be_ordered() -> None:
 # ---- selection
 
 
-def test_a_point_is_described_as_in_rviz() -> None:
+def test_point_is_described_as_in_rviz() -> None:
     rgb = np.array([0, packed_color(10, 20, 30, 40)], np.uint32).view(np.float32)
     columns = {name: np.array([0, 1 + i], np.float32) for i, name in enumerate("xyz")}
     columns |= {

@@ -60,7 +60,7 @@ def shader(colors: PointColors, position: np.ndarray, channel: Any) -> list[floa
 
 
 # Made by hand from the hue circle: 300 degrees (magenta) at 0 to 0 degrees (red) at 1.
-def test_the_rainbow_goes_from_magenta_to_red() -> None:
+def test_rainbow_goes_from_magenta_to_red() -> None:
     parts = np.array([0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1], np.float32)
     expected = [
         (1, 0, 1),
@@ -97,7 +97,7 @@ ANY = ["AxisColor", "FlatColor", "Intensity"]
         ({"r": FLOAT.astype(np.uint8), "g": FLOAT, "b": FLOAT}, ANY, "Intensity"),
     ],
 )
-def test_the_choice_of_the_transformer(
+def test_choice_of_the_transformer(
     columns: dict[str, Any], supported: list[str], default: str
 ) -> None:
     layout = cloud(columns | {"pad": FLOAT}).layout
@@ -135,7 +135,7 @@ def test_intensity_with_two_colors_and_fixed_bounds() -> None:
     assert colors.bounds == (0, 100)
 
 
-def test_the_defaults_are_those_of_rviz() -> None:
+def test_defaults_are_those_of_rviz() -> None:
     assert Intensity() == Intensity(
         "intensity", True, False, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), True, 0.0, 4096.0
     )
@@ -160,7 +160,7 @@ def test_values_that_are_not_finite_have_the_color_of_the_minimum() -> None:
     assert colors.of_points(found).tolist() == [RED, RED, RED, RED, MAGENTA]
 
 
-def test_a_missing_channel_makes_white_points_and_a_warning() -> None:
+def test_missing_channel_makes_white_points_and_a_warning() -> None:
     found = cloud({"ring": np.zeros(2, np.uint16)})
     colors = Intensity().colors(found)
     assert colors.of_points(found).tolist() == [WHITE] * 2
@@ -226,7 +226,7 @@ def test_colors_along_an_axis() -> None:
     assert level.of_points(found).tolist() == [RED] * 6
 
 
-def test_the_axis_of_the_fixed_frame() -> None:
+def test_axis_of_the_fixed_frame() -> None:
     found = line(0, 1, 2, 3, 4, 5)
     # The cloud's z is the fixed frame's -x, 100 km away.
     transform = np.array([[0, 0, -1, 1e5], [0, 1, 0, 0], [1, 0, 0, 5], [0, 0, 0, 1]], float)
@@ -240,7 +240,7 @@ def test_the_axis_of_the_fixed_frame() -> None:
     assert own.of_points(found).tolist() == expected[::-1]
 
 
-def test_the_shaders_formulas_give_the_same_colors() -> None:
+def test_shaders_formulas_give_the_same_colors() -> None:
     random = np.random.default_rng(3)
     columns = random_points(60) | {
         "intensity": random.normal(0, 50, 60).astype(np.float32),

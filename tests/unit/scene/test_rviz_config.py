@@ -103,12 +103,12 @@ def test_nothing_of_a_public_file_is_lost(file: Path, tmp_path: Path) -> None:
         assert keys(after) == keys(before)
 
 
-def test_the_data_has_both_formats() -> None:
+def test_data_has_both_formats() -> None:
     assert len(FILES) >= 15
     assert {file.name[:4] for file in FILES} == {"ros1", "ros2"}
 
 
-def test_the_nav2_config() -> None:
+def test_nav2_config() -> None:
     nav2 = load("ros2_nav2")
     assert (nav2.ros, nav2.fixed_frame, nav2.options["Frame Rate"]) == (2, "map", 30)
     assert nav2.background_color == pytest.approx((48 / 255, 48 / 255, 48 / 255, 1))
@@ -143,7 +143,7 @@ def test_the_nav2_config() -> None:
     assert nav2.panels[-1] == {"Class": "nav2_rviz_plugins/Docking", "Name": "Docking"}
 
 
-def test_a_config_of_ros_1_with_groups_in_groups() -> None:
+def test_config_of_ros_1_with_groups_in_groups() -> None:
     husky = load("ros1_husky")
     names = [display.name for display in husky.walk()]
     at = names.index("Navigation")
@@ -203,7 +203,7 @@ def test_settings_that_a_file_leaves_out() -> None:
 # -- classes ---------------------------------------------------------------------------------------
 
 
-def test_the_types_of_all_classes() -> None:
+def test_types_of_all_classes() -> None:
     for name in ROS1_DISPLAYS.split():
         assert display_type(f"rviz/{name}") == name
     for name in ROS2_DISPLAYS.split():
@@ -247,7 +247,7 @@ def test_new_entries_have_the_classes_of_their_rviz() -> None:
 
 
 @pytest.mark.parametrize("ros", [1, 2])
-def test_a_new_config(ros: int, tmp_path: Path) -> None:
+def test_new_config(ros: int, tmp_path: Path) -> None:
     new = RvizConfig(ros)
     new.fixed_frame, new.background_color = "odom", (1, 0.5, 0)
     group = DisplayConfig.new("Group", ros, name="Sensors")
@@ -348,7 +348,7 @@ def test_unquoted_texts_are_written_as_they_were_read(text: str) -> None:
     assert texts(found.dump())["Visualization Manager"]["Displays"][0]["V"] == text
 
 
-def test_the_order_of_keys_is_kept() -> None:
+def test_order_of_keys_is_kept() -> None:
     text = (
         "Window Geometry:\n  Y: 1\n  X: 2\n"
         "Visualization Manager:\n"
@@ -392,7 +392,7 @@ def test_value_that_rviz_cannot_read_is_not_saved(
     assert file.read_text() == "old"
 
 
-def test_a_group_in_itself_is_not_saved() -> None:
+def test_group_in_itself_is_not_saved() -> None:
     new = RvizConfig()
     group = DisplayConfig.new("Group")
     group.displays.append(group)
@@ -401,7 +401,7 @@ def test_a_group_in_itself_is_not_saved() -> None:
         new.dump()
 
 
-def test_a_folder_that_is_missing(tmp_path: Path) -> None:
+def test_folder_that_is_missing(tmp_path: Path) -> None:
     with pytest.raises(Error, match=r"none/a\.rviz cannot be written: No such file"):
         RvizConfig().save(tmp_path / "none" / "a.rviz")
 
@@ -629,7 +629,7 @@ def test_topics_that_are_not_valid(settings: dict[str, Any], fault: str) -> None
         read_topic(settings)
 
 
-def test_a_topic_that_is_changed_keeps_the_rest() -> None:
+def test_topic_that_is_changed_keeps_the_rest() -> None:
     settings: dict[str, Any] = {"Topic": {"Depth": 7, "Value": "/a", "Filter size": 3}}
     write_topic(settings, TopicSetting("/b", durability="Transient Local"), 2)
     assert settings == {
@@ -645,7 +645,7 @@ def test_a_topic_that_is_changed_keeps_the_rest() -> None:
     assert image == {"Class": "rviz/Image", "Image Topic": "/b"}
 
 
-def test_the_qos_of_a_topic() -> None:
+def test_qos_of_a_topic() -> None:
     assert TopicSetting("/a").qos(QoS(depth=3)) == QoS(depth=3)
     found = TopicSetting("/a", 5, "Best Effort", "Transient Local", "System Default").qos()
     assert (found.depth, found.reliability) == (5, Reliability.BEST_EFFORT)

@@ -298,7 +298,7 @@ def test_entities_are_never_expanded() -> None:
         (visual('<sphere radius="1"/>', '<origin quat_xyzw="0 0 0 0"/>'), "quat_xyzw .* zero"),
     ],
 )
-def test_a_broken_visual_is_left_out(broken: str, message: str) -> None:
+def test_broken_visual_is_left_out(broken: str, message: str) -> None:
     good = visual('<sphere radius="2"/>')
     found = robot(f'<link name="a">{good}{broken}{good}</link>')
     assert len(found.links["a"].visuals) == 2
@@ -359,7 +359,7 @@ def test_warnings(body: str, message: str) -> None:
     assert set(found.poses({"b_joint": 1.0})) == set(found.links)
 
 
-def test_a_fixed_joint_needs_no_axis() -> None:
+def test_fixed_joint_needs_no_axis() -> None:
     found = robot(links("a", "b") + joint("a", "b", '<axis xyz="0 0 0"/>'))
     assert not found.warnings
 
@@ -400,7 +400,7 @@ def test_many_warnings_are_cut_off() -> None:
     assert found.warnings[-1] == "test.urdf: 900 more warnings"
 
 
-def test_a_robot_without_a_name() -> None:
+def test_robot_without_a_name() -> None:
     found = parse_urdf("<robot><link name='a'/></robot>")
     assert found.warnings == (
         "robot_description:1: <robot> has no name; give it one: <robot name=...>",

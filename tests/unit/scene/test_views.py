@@ -98,7 +98,7 @@ def test_defaults_are_rviz_s() -> None:
 # Orbit
 
 
-def test_the_left_button_turns_by_5_mrad_for_each_unit_and_stops_at_the_pole() -> None:
+def test_left_button_turns_by_5_mrad_for_each_unit_and_stops_at_the_pole() -> None:
     view = OrbitView()
     drag(view, LEFT, 40, 20)
     assert (view.yaw, view.pitch) == pytest.approx((math.pi / 4 - 0.2, math.pi / 4 + 0.1))
@@ -110,7 +110,7 @@ def test_the_left_button_turns_by_5_mrad_for_each_unit_and_stops_at_the_pole() -
     assert view.pitch == -STEEP
 
 
-def test_the_middle_button_and_shift_keep_what_is_seen_under_the_mouse() -> None:
+def test_middle_button_and_shift_keep_what_is_seen_under_the_mouse() -> None:
     for button, held in ((MIDDLE, Modifier.NONE), (MIDDLE, SHIFT), (LEFT, SHIFT)):
         view = OrbitView()
         view.focal_point = (1, 2, 3)
@@ -122,7 +122,7 @@ def test_the_middle_button_and_shift_keep_what_is_seen_under_the_mouse() -> None
         assert view.distance == 10
 
 
-def test_the_right_button_and_the_wheel_zoom() -> None:
+def test_right_button_and_the_wheel_zoom() -> None:
     view = OrbitView()
     drag(view, RIGHT, 0, 10)
     assert view.distance == pytest.approx(11)
@@ -161,7 +161,7 @@ def test_moving_without_a_button_changes_nothing() -> None:
         assert view.state() == state
 
 
-def test_an_inverted_z_axis_turns_the_frame_over() -> None:
+def test_inverted_z_axis_turns_the_frame_over() -> None:
     view = OrbitView()
     view.invert_z = True
     x, y, z = eye(view)
@@ -174,7 +174,7 @@ def test_an_inverted_z_axis_turns_the_frame_over() -> None:
     assert near(view.camera(*SIZE).project((1, 1, 1))[:2], (400, 300), 1e-6)
 
 
-def test_the_focal_shape_is_a_flat_ball_at_the_focus() -> None:
+def test_focal_shape_is_a_flat_ball_at_the_focus() -> None:
     view = OrbitView()
     view.focal_point = (1, 2, 3)
     view.update_target(place(10, 0))
@@ -189,7 +189,7 @@ def test_the_focal_shape_is_a_flat_ball_at_the_focus() -> None:
 # The others
 
 
-def test_a_map_turns_moves_and_zooms() -> None:
+def test_map_turns_moves_and_zooms() -> None:
     view = TopDownOrthoView()
     drag(view, LEFT, 40, 7)
     assert view.angle == pytest.approx(0.2)
@@ -209,7 +209,7 @@ def test_a_map_turns_moves_and_zooms() -> None:
     assert view.scale > 0
 
 
-def test_a_negative_scale_is_a_map_turned_by_half_a_turn() -> None:
+def test_negative_scale_is_a_map_turned_by_half_a_turn() -> None:
     view, turned = TopDownOrthoView(), TopDownOrthoView()
     view.scale, turned.angle = -10, math.pi
     assert near(matrix_of(view), matrix_of(turned))
@@ -245,7 +245,7 @@ def test_views_on_the_ground_move_along_the_ground() -> None:
         assert view.distance == pytest.approx(11 * 0.88)
 
 
-def test_the_sky_cannot_be_dragged_and_the_horizon_not_far() -> None:
+def test_sky_cannot_be_dragged_and_the_horizon_not_far() -> None:
     view = XYOrbitView()
     view.pitch = 0.1
     drag(view, MIDDLE, 0, 20, at=(400, 10))
@@ -284,7 +284,7 @@ def test_shift_rolls_in_rviz_1_and_moves_in_rviz_2() -> None:
     assert new.action(LEFT, SHIFT) is Action.MOVE_XY
 
 
-def test_a_camera_that_rviz_1_saved_turned_over_still_looks_the_same_way() -> None:
+def test_camera_that_rviz_1_saved_turned_over_still_looks_the_same_way() -> None:
     view = FPSView()
     # RViz 1.14 writes this for a camera at yaw -135 degrees and pitch 54.7 degrees.
     view.yaw, view.pitch, view.roll = math.pi / 4, math.pi - 0.955, math.pi
@@ -295,7 +295,7 @@ def test_a_camera_that_rviz_1_saved_turned_over_still_looks_the_same_way() -> No
     assert abs(view.pitch) <= STEEP
 
 
-def test_an_aligned_camera_points_along_an_axis_of_its_frame() -> None:
+def test_aligned_camera_points_along_an_axis_of_its_frame() -> None:
     view = FrameAlignedView()
     assert view.point_towards == "-z axis"
     view.update_target(place(1, 2, 3, yaw=0.5, pitch=0.3))
@@ -347,7 +347,7 @@ def test_cursors_and_help_are_rviz_s() -> None:
 # Touch and keys
 
 
-def test_a_touch_is_the_movement_of_its_fingers() -> None:
+def test_touch_is_the_movement_of_its_fingers() -> None:
     touch = Touch.between([(0, 0), (10, 0)], [(5, -5), (5, 15)], SIZE)
     # On a screen y points down: this is a quarter turn clockwise.
     assert touch[:-1] == pytest.approx((2, 5, 5, 0, 5, 2, math.pi / 2), abs=1e-9)
@@ -449,7 +449,7 @@ def test_reset_returns_to_the_start(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_the_camera_follows_its_target_frame(name: str) -> None:
+def test_camera_follows_its_target_frame(name: str) -> None:
     view = create_view(name)
     view.set("Target Frame", "base_link")
     view.update_target(place(1, 2, 3))
@@ -512,7 +512,7 @@ def test_settings_are_in_the_target_frame() -> None:
     assert near(view.focal_point, (0, 0, 0))
 
 
-def test_a_view_from_a_file_is_placed_at_its_frame() -> None:
+def test_view_from_a_file_is_placed_at_its_frame() -> None:
     view = OrbitView()
     before = eye(view)
     view.restore({"Target Frame": "base_link"})
@@ -545,7 +545,7 @@ def test_any_view_takes_over_from_any_other(old: str, new: str) -> None:
         assert near(after.pose[:3, :3], before.pose[:3, :3], 0.02)
 
 
-def test_an_orbit_takes_over_from_a_map_from_100_m() -> None:
+def test_orbit_takes_over_from_a_map_from_100_m() -> None:
     source, view = TopDownOrthoView(), OrbitView()
     source.x, source.y = 3, 4
     view.mimic(source)
@@ -556,14 +556,14 @@ def test_an_orbit_takes_over_from_a_map_from_100_m() -> None:
     assert view.yaw == pytest.approx(1.5 * math.pi)
 
 
-def test_a_first_person_takes_over_the_direction_of_a_map() -> None:
+def test_first_person_takes_over_the_direction_of_a_map() -> None:
     source, view = TopDownOrthoView(), FPSView()
     source.angle = 0.5
     view.mimic(source)
     assert near(view.camera(*SIZE).pose, source.camera(*SIZE).pose)
 
 
-def test_a_view_of_the_ground_begins_anew_where_no_ground_is_seen() -> None:
+def test_view_of_the_ground_begins_anew_where_no_ground_is_seen() -> None:
     source, view = FPSView(), XYOrbitView()
     source.pitch = -0.5
     view.mimic(source)
@@ -595,7 +595,7 @@ ROS_1 = {
 }
 
 
-def test_a_view_is_read_and_written_as_rviz_does_it() -> None:
+def test_view_is_read_and_written_as_rviz_does_it() -> None:
     view = create_view("rviz/Orbit")
     assert view.restore(ROS_1) == []
     assert isinstance(view, OrbitView)
@@ -624,7 +624,7 @@ def test_unknown_keys_are_kept_and_belong_to_the_view(name: str) -> None:
     assert view.state()["Own"] == {"a": [1, 2]}
 
 
-def test_an_aligned_view_keeps_its_angles_in_files() -> None:
+def test_aligned_view_keeps_its_angles_in_files() -> None:
     view = FrameAlignedView()
     drag(view, LEFT, 30, -40)
     again = FrameAlignedView()
@@ -693,7 +693,7 @@ def test_values_outside_are_clamped_as_in_rviz(name: str, given: Any, kept: Any)
     assert np.isfinite(matrix_of(view)).all()
 
 
-def test_a_scale_of_0_shows_the_most_there_is() -> None:
+def test_scale_of_0_shows_the_largest_area() -> None:
     view = TopDownOrthoView()
     view.scale = 0
     assert view.scale == 1e-4
@@ -722,7 +722,7 @@ def test_bad_values_by_program_are_errors_that_name_the_setting() -> None:
         OrbitView().on_wheel(Wheel(math.nan))
 
 
-def test_a_panel_learns_all_about_the_settings() -> None:
+def test_panel_reads_all_settings() -> None:
     found = {row["path"]: row for row in FrameAlignedView().describe()}
     assert found["Point towards"]["choices"][0] == "arbitrary"
     assert found["Position"]["value"] == {"X": 0, "Y": 0, "Z": 0}

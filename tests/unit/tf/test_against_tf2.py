@@ -130,7 +130,7 @@ def ask(buffer: TransformBuffer, query: list[Any]) -> tuple[Transform | Transfor
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_the_same_answers(seed: int) -> None:
+def test_same_results_as_tf2(seed: int) -> None:
     dice = random.Random(seed)
     transforms = some_transforms(dice)
     queries = some_queries(dice, transforms, 5000)
@@ -164,7 +164,7 @@ def test_the_same_answers(seed: int) -> None:
     assert kinds["values"] > 1000, kinds
 
 
-def test_the_same_yaml() -> None:
+def test_same_yaml_as_tf2() -> None:
     dice = random.Random(3)
     transforms = some_transforms(dice)
     theirs = tf2({"cache_time": CACHE_TIME, "transforms": transforms, "queries": []})

@@ -45,7 +45,7 @@ def put(
     return buffer.set_transform(given, authority, static=static)
 
 
-def test_a_chain_up_down_and_across() -> None:
+def test_chain_up_down_and_across() -> None:
     buffer = TransformBuffer()
     put(buffer, "map", "base", rotation=LEFT)
     put(buffer, "base", "arm", x=2.0)
@@ -72,7 +72,7 @@ def test_interpolation_and_time_travel() -> None:
         buffer.lookup_transform("map", "base", at(0.9))
 
 
-def test_the_shorter_way_round() -> None:
+def test_shorter_way_round() -> None:
     buffer = TransformBuffer()
     put(buffer, "map", "base", 1.0, rotation=(0.0, 0.0, 0.0, 1.0))
     put(buffer, "map", "base", 2.0, rotation=(0.0, 0.0, -HALF, -HALF))
@@ -80,7 +80,7 @@ def test_the_shorter_way_round() -> None:
     assert found == pytest.approx((0, 0, math.sin(math.pi / 8), math.cos(math.pi / 8)))
 
 
-def test_a_fixed_frame_and_two_times() -> None:
+def test_fixed_frame_and_two_times() -> None:
     buffer = TransformBuffer()
     for second in (1, 2, 3):
         put(buffer, "odom", "base", second, float(second))
@@ -139,7 +139,7 @@ def test_invalid_cache_times_are_rejected(time: object) -> None:
         TransformBuffer(time)  # type: ignore[arg-type]
 
 
-def test_the_newest_is_the_newest_common() -> None:
+def test_newest_is_the_newest_common() -> None:
     buffer = TransformBuffer()
     put(buffer, "map", "base", 5.0)
     put(buffer, "map", "base", 9.0)
@@ -186,7 +186,7 @@ def test_many_frames_at_once_are_where_each_of_them_is() -> None:
             assert rotation == pytest.approx(alone.rotation)
 
 
-def test_a_leading_slash_is_left_out() -> None:
+def test_leading_slash_is_left_out() -> None:
     buffer = TransformBuffer()
     notified: list[str] = []
     buffer.on_tree_change(lambda: notified.append("tree"))
@@ -258,7 +258,7 @@ def test_only_the_last_seconds_are_kept() -> None:
         buffer.lookup_transform("map", "base", at(9.98))
 
 
-def test_a_new_parent_counts_from_then_on() -> None:
+def test_new_parent_counts_from_then_on() -> None:
     buffer = TransformBuffer()
     put(buffer, "left", "cup", 1.0)
     put(buffer, "right", "cup", 2.0)
@@ -344,7 +344,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return now
 
 
-def test_a_robot_whose_clock_went_back_is_believed(
+def test_robot_whose_clock_was_set_back_is_followed(
     clock: list[float], caplog: pytest.LogCaptureFixture
 ) -> None:
     buffer = TransformBuffer()
@@ -363,7 +363,7 @@ def test_a_robot_whose_clock_went_back_is_believed(
     assert sum(text in record.getMessage() for record in caplog.records) == 1
 
 
-def test_a_frame_that_turned_round_with_its_clock(clock: list[float]) -> None:
+def test_frame_with_a_new_parent_after_a_clock_reset(clock: list[float]) -> None:
     buffer = TransformBuffer()
     put(buffer, "map", "base", 500.0)
     assert not put(buffer, "odom", "base", 100.0)
@@ -397,7 +397,7 @@ def test_earlier_late_data_does_not_count_after_clearing(clock: list[float]) -> 
     assert not put(buffer, "map", "base", 600.0)
 
 
-def test_a_hint_at_similar_frames_is_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hint_at_similar_frames_is_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
     found: list[str] = []
 
     def similar(name: str, known: Any) -> str:
@@ -463,7 +463,7 @@ def test_lookups_of_frames_that_nothing_connects_share_what_they_find() -> None:
         assert caches.looks < 4 * len(frames), "they are walked along again and again"
 
 
-def test_a_lookup_of_many_frames_ends_soon() -> None:
+def test_lookup_of_many_frames_ends_soon() -> None:
     # Each link moves at times of its own: no frame shares a pose with another one.
     buffer = TransformBuffer()
     count = 900
@@ -565,7 +565,7 @@ def test_long_names_are_refused_and_not_kept(caplog: pytest.LogCaptureFixture) -
     assert sorted(map(len, buffer.frame_names())) == [4, 255]
 
 
-def test_a_tree_of_some_frames() -> None:
+def test_tree_of_some_frames() -> None:
     buffer = TransformBuffer()
     put(buffer, "map", "odom")
     put(buffer, "odom", "base", static=True)

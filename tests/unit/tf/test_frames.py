@@ -26,7 +26,7 @@ def buffer() -> TransformBuffer:
     return made
 
 
-def test_a_frame(buffer: TransformBuffer) -> None:
+def test_frame(buffer: TransformBuffer) -> None:
     one, three = Time.from_parts(1, 0), Time.from_parts(3, 0)
     base = buffer.frame("base")
     assert base == FrameInfo("base", "odom", "/base_node", False, three, one, 3)
@@ -43,7 +43,7 @@ def test_a_frame(buffer: TransformBuffer) -> None:
     assert not buffer.has_frame("never")
 
 
-def test_the_rate_falls_to_zero_when_nothing_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rate_falls_to_zero_when_nothing_comes(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [100.0]
     for module in ("buffer", "frames"):
         monkeypatch.setattr(f"rosglass.tf.{module}.monotonic", lambda: clock[0])
@@ -66,7 +66,7 @@ def test_the_rate_falls_to_zero_when_nothing_comes(monkeypatch: pytest.MonkeyPat
     assert buffer.tree()["base"].rate == 0
 
 
-def test_the_tree(buffer: TransformBuffer) -> None:
+def test_tree(buffer: TransformBuffer) -> None:
     tree = buffer.tree()
     assert sorted(tree) == ["arm", "base", "camera", "far", "map", "odom", "other"]
     assert tree.roots() == ["map", "far"]

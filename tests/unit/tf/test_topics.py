@@ -212,7 +212,7 @@ def test_static_transforms_can_be_sent_after_one_that_failed() -> None:
     assert sorted(listener.buffer.tree()) == ["camera", "lidar", "map"]
 
 
-def test_the_name_of_a_publisher_is_asked_for_once() -> None:
+def test_name_of_a_publisher_is_asked_for_once() -> None:
     node: Any = Node()
     listener = TransformListener(node)
     TransformBroadcaster(node).send_transform(place("base"))

@@ -553,7 +553,9 @@ class PathDisplay(HistoryDisplay):
     )
     axesLength = _metres("Length", 0.3, _POSE_AXES)
     axesRadius = _metres("Radius", 0.03, _POSE_AXES)
-    poseColor = Setting("Pose Color", "color", "#ff55ff", "Colour of arrows.", shown_if=_POSE_ARROWS)
+    poseColor = Setting(
+        "Pose Color", "color", "#ff55ff", "Colour of arrows.", shown_if=_POSE_ARROWS
+    )
     shaftLength = _metres("Shaft Length", 0.1, _POSE_ARROWS)
     headLength = _metres("Head Length", 0.2, _POSE_ARROWS)
     shaftDiameter = _metres("Shaft Diameter", 0.1, _POSE_ARROWS)
