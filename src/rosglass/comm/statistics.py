@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import struct
 import time
 from dataclasses import dataclass
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "LatencyEstimator",
-    "Pace",
     "StampMonitor",
     "Statistics",
     "fading_rate",
@@ -63,40 +61,6 @@ def note_time(times: deque[float], now: float) -> None:
     if len(times) > 1 and rate_of(times, now) == 0:
         times.clear()
     times.append(now)
-
-
-class Pace:
-    """Turns at a rate, which is kept although timers fire late and in whole milliseconds.
-
-    All times are in seconds of one clock.
-    """
-
-    def __init__(self) -> None:
-        self._turn = -math.inf
-
-    def wait(self, interval: float, now: float) -> float:
-        """Return the time until the next turn; 0 or less if it is due.
-
-        Args:
-            interval: Wanted time between two turns.
-            now: The current time.
-        """
-        return self._turn + interval - now
-
-    def take(self, interval: float, now: float) -> None:
-        """Begin a turn: one that is less than an interval late does not delay the next."""
-        due = self._turn + interval
-        self._turn = due if abs(now - due) < interval else now
-
-    def take_ms(self, rate: float) -> int:
-        """Begin a turn; return the whole milliseconds until the next one, for a timer.
-
-        Args:
-            rate: Turns per second, above 0.
-        """
-        interval, now = 1 / rate, time.monotonic()
-        self.take(interval, now)
-        return max(0, round(self.wait(interval, now) * 1000))
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from abc import abstractmethod
 from contextlib import suppress
@@ -36,6 +37,7 @@ __all__ = [
     "RETRY_MS",
     "ClientElement",
     "Element",
+    "Pace",
     "TopicElement",
     "given_fields",
     "named",
@@ -56,6 +58,40 @@ def single_shot(parent: QtCore.QObject, on_timeout: Callable[[], None]) -> QtCor
     timer.setSingleShot(True)
     timer.timeout.connect(on_timeout)
     return timer
+
+
+class Pace:
+    """Turns at a rate, which is kept although timers fire late and in whole milliseconds.
+
+    All times are in seconds of one clock.
+    """
+
+    def __init__(self) -> None:
+        self._turn = -math.inf
+
+    def wait(self, interval: float, now: float) -> float:
+        """Return the time until the next turn; 0 or less if it is due.
+
+        Args:
+            interval: Wanted time between two turns.
+            now: The current time.
+        """
+        return self._turn + interval - now
+
+    def take(self, interval: float, now: float) -> None:
+        """Begin a turn: one that is less than an interval late does not delay the next."""
+        due = self._turn + interval
+        self._turn = due if abs(now - due) < interval else now
+
+    def take_ms(self, rate: float) -> int:
+        """Begin a turn; return the whole milliseconds until the next one, for a timer.
+
+        Args:
+            rate: Turns per second, above 0.
+        """
+        interval, now = 1 / rate, time.monotonic()
+        self.take(interval, now)
+        return max(0, round(self.wait(interval, now) * 1000))
 
 
 #: Milliseconds until an object without an engine is one that will not be destroyed.

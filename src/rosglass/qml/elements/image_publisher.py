@@ -10,9 +10,9 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.executor import Dispatcher
-from rosglass.comm.statistics import Pace, note_time, rate_of
+from rosglass.comm.statistics import note_time, rate_of
 from rosglass.errors import Error
-from rosglass.qml.elements.element import Element, single_shot
+from rosglass.qml.elements.element import Element, Pace, single_shot
 from rosglass.qml.elements.image_sinks import window_of
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.from_js import fields_from_js, numpy

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from rosglass.comm.statistics import Pace, note_time, rate_of
+from rosglass.comm.statistics import note_time, rate_of
 from rosglass.comm.time import Time
 from rosglass.images import ImageStream
+from rosglass.qml.elements.element import Pace
 from rosglass.qml.elements.image_rendering import Look, Picture, Renderer
 from rosglass.qml.elements.load_balancer import LoadBalancer
 from rosglass.qt import QtCore, is_alive

@@ -10,9 +10,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.qos import Durability, History, QoS, Reliability
-from rosglass.comm.statistics import Pace
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
-from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS, TopicElement, single_shot
+from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS, Pace, TopicElement, single_shot
 from rosglass.qml.engine.callbacks import Deferred, call_back
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.js_values import qos_from_js

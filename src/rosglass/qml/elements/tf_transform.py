@@ -8,10 +8,10 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import rosglass
-from rosglass.comm.statistics import Pace, StampMonitor
+from rosglass.comm.statistics import StampMonitor
 from rosglass.comm.time import Time
 from rosglass.errors import Error, TransformException
-from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS, Element, single_shot
+from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS, Element, Pace, single_shot
 from rosglass.qml.elements.tf_buffer import TfBuffer, TfLink, shown_transform
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.from_js import fields_from_js

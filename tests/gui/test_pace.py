@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from rosglass.comm.statistics import Pace
+from rosglass.qml.elements.element import Pace
 
 
 @pytest.mark.parametrize("rate", [0.5, 20, 30, 62.5, 120])
@@ -25,7 +25,7 @@ def test_late_turns_do_not_lower_the_rate(rate: float, late: float) -> None:
 @pytest.mark.parametrize("rate", [30, 62.5, 120, 400, 1000])
 def test_timers_in_milliseconds_keep_the_rate(rate: float, monkeypatch: pytest.MonkeyPatch) -> None:
     now, turns, pace = 100.0, 0, Pace()
-    monkeypatch.setattr("rosglass.comm.statistics.time.monotonic", lambda: now)
+    monkeypatch.setattr("rosglass.qml.elements.element.time.monotonic", lambda: now)
     while now < 110:
         now += pace.take_ms(rate) / 1000
         turns += 1
