@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rosglass import DecodeError, FieldPathError
 from rosglass.messages import MessageType, load
@@ -89,58 +91,35 @@ def bracketed(path: str) -> str:
     return "".join(f"[{name!r}]{mark}{rest}" for name, mark, rest in named)
 
 
-PATHS = [
-    "name",
-    "flag",
-    "last",
-    "wide",
-    "parts[0].label",
-    "parts[-1].label",
-    "parts[3].inner.big",
-    "parts[4].samples[2]",
-    "parts[4].samples",
-    "parts[2].good",
-    "parts[*].label",
-    "parts[*].inner.big",
-    "parts[*].good",
-    "parts[*].samples",
-    "pair[1].big",
-    "pair[-2].small",
-    "pair[*].big",
-    "even[2].n",
-    "even[*].x",
-    "even[*].on",
-    "even[*].n",
-    "values",
-    "values[3]",
-    "values[-1]",
-    "values[1:3]",
-    "values[::-2]",
-    "values[*]",
-    "four[0]",
-    "four[-1]",
-    "four[1:]",
-    "bits",
-    "bits[2]",
-    "bits[1:]",
-    "words",
-    "words[1]",
-    "words[-1]",
-    "words[:2]",
-    "words[*]",
-    "parts",
-    "parts[1:3]",
-    "parts[1]",
-    "parts[1].inner",
-    "even",
-    "pair",
-]
+@st.composite
+def paths(draw: st.DrawFn) -> str:
+    """A path into VALUE: fields, elements, at most one [*], and a slice at the end."""
+    value: Any = VALUE
+    path = ""
+    while not path or draw(st.booleans()):
+        if isinstance(value, dict):
+            name = draw(st.sampled_from(sorted(value)))
+            path, value = f"{path}.{name}" if path else name, value[name]
+        elif isinstance(value, list) and value and "[*]" not in path:
+            index = draw(st.integers(-len(value), len(value) - 1))
+            inner = isinstance(value[0], dict)
+            path, value = f"{path}[{'*' if inner and draw(st.booleans()) else index}]", value[index]
+        else:
+            break
+    if isinstance(value, list) and "[*]" not in path and draw(st.booleans()):
+        path += draw(st.sampled_from(["[*]", "[1:3]", "[1:]", "[:2]", "[::-2]"]))
+    return path
 
 
-@pytest.mark.parametrize("path", PATHS)
+#: The same paths every time.
+steady = settings(max_examples=150, deadline=None, derandomize=True)
+
+
 @pytest.mark.parametrize(
     "how", [{"wire": "cdr"}, {"wire": "cdr", "byteorder": "big"}, {"wire": "ros1"}]
 )
+@steady
+@given(path=paths())
 def test_paths_read_the_values(path: str, how: dict[str, str]) -> None:
     data = KIND.encode(VALUE, **how)
     read = KIND.path(path, wire=how["wire"])
@@ -238,8 +217,9 @@ def outcome(read: Callable[[bytes], Any], data: bytes) -> Any:
         return error.type_name.split("/")[0]
 
 
-@pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("wire", ["cdr", "ros1"])
+@steady
+@given(path=paths())
 def test_cut_off_bytes_give_the_value_or_an_error(path: str, wire: str) -> None:
     data = KIND.encode(VALUE, wire=wire)
     # Cut off at the right place, wide characters of 4 bytes are a whole message with those of 2.
