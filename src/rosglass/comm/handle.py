@@ -77,6 +77,8 @@ class guarded:  # noqa: N801 - it reads as a statement, and a generator costs a 
     samples or jobs, on a thread that must not end. Errors that end the program, SystemExit and
     KeyboardInterrupt, are raised in the main thread.
 
+    It has no state: what runs for each sample makes one, and enters it every time.
+
     Args:
         log: The logger to write to.
         text: What has failed, as for :meth:`logging.Logger.exception`.

@@ -198,6 +198,7 @@ class ServiceClient(Client):
         super().__init__(core, name)
         self.qos = qos
         self._numbers = itertools.count(1)
+        self._processing = guarded(_log, "%s: processing a response failed", name)
         #: Every use is atomic.
         self._waiters: list[None] = []
         self._calls = PendingCalls()
@@ -417,7 +418,7 @@ class ServiceClient(Client):
         if pending.call.done():
             return
         pending.answered = True
-        with guarded(_log, "%s: processing a response failed", self.name):
+        with self._processing:
             if data is not None:
                 self._complete(pending, data)
             elif isinstance(error, Error):

@@ -163,25 +163,21 @@ class ServiceServer(Handle):
         except DecodeError as error:
             self._refuse(request, f"the request is not a {self.type.request.name}: {error}")
             return
-        self._attempt(request, lambda: self._call(request, message))
+        self._answer(request, lambda: self._callback(message))
 
-    def _attempt(self, request: RequestId, step: Callable[[], None]) -> None:
-        """Run a step towards an answer; any error of the user's code in it is the answer."""
+    def _answer(self, request: RequestId, call: Callable[[], Any]) -> None:
+        """Respond with the result of a call, now or when its future is done, or with its error."""
         try:
-            step()
+            answer = call()
+            if inspect.iscoroutine(answer):
+                answer = self._start(answer)
+            if isinstance(answer, Future):
+                answer.add_done_callback(lambda future: self._finish(request, future))
+            else:
+                self._respond(request, answer)
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the client waits for an answer
             self._on_failure(request, error)
             reraise_exit(error)
-
-    def _call(self, request: RequestId, message: Message) -> None:
-        """Call back, and respond now or when the callback's future is done."""
-        answer: Any = self._callback(message)
-        if inspect.iscoroutine(answer):
-            answer = self._start(answer)
-        if isinstance(answer, Future):
-            answer.add_done_callback(lambda future: self._finish(request, future))
-        else:
-            self._respond(request, answer)
 
     def _start(self, coroutine: Coroutine[Any, Any, Any]) -> Future[Any]:
         """Start a callback's coroutine."""
@@ -205,7 +201,7 @@ class ServiceServer(Handle):
         if future.cancelled():
             self._refuse(request, "the callback's future was cancelled")
             return
-        self._attempt(request, lambda: self._respond(request, future.result(0)))
+        self._answer(request, lambda: future.result(0))
 
     def _respond(self, request: RequestId, answer: Any) -> None:
         """Send the callback's response."""

@@ -284,10 +284,13 @@ class Ros2Requester(ServiceRequester):
             self._core.timers.after(_RETRY_S, self._retry)
 
     def _send_waiting(self) -> None:
-        while (pending := self._calls.first()) is not None and self.ready():
+        while self._calls.waiting and self.ready():
+            pending = self._calls.first()
             with self._lock:
                 requester, kind = self._requester, self.type
-            if requester is None or kind is None or not self._window.enter(pending, self._flush):
+            if pending is None or requester is None or kind is None:
+                return
+            if not self._window.enter(pending, self._flush):
                 return
             if self._calls.take(pending) and not pending.call.done():
                 self._send(requester, kind, pending)

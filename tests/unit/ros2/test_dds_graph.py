@@ -347,3 +347,13 @@ def test_endpoints_that_do_not_speak_our_encoding_are_known(
     assert domain.dds.is_foreign(guid) is foreign
     domain.drop(guid)
     assert not domain.dds.is_foreign(guid)
+
+
+def test_vendors_follow_the_participants(domain):
+    assert domain.dds.vendors == {b"\x01\x10"}
+    first, second = domain.join(), domain.join()
+    assert domain.dds.vendors == {b"\x01\x10", b"\x01\x0f"}
+    domain.leave(first)
+    assert b"\x01\x0f" in domain.dds.vendors
+    domain.leave(second)
+    assert domain.dds.vendors == {b"\x01\x10"}

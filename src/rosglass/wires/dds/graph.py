@@ -284,10 +284,12 @@ class DdsGraph:
 
     Attributes:
         moved: Monotonic time of the latest discovery of another participant's reader or writer.
+        vendors: The vendors of all participants, our own included: two bytes of their GUIDs.
     """
 
     def __init__(self, graph: Graph, own: bytes) -> None:
         self.moved = 0.0
+        self.vendors: frozenset[bytes] = frozenset()
         self._graph, self._own = graph, own[:_PREFIX]
         self._participants: dict[bytes, _Participant] = {}
         self._endpoints: dict[bytes, EndpointInfo] = {}
@@ -301,10 +303,6 @@ class DdsGraph:
     def peers(self) -> int:
         """Number of other participants in the domain."""
         return len(self._participants) - (self._own in self._participants)
-
-    def prefixes(self) -> list[bytes]:
-        """Return the GUID prefixes of all participants, our own included."""
-        return list(self._participants)
 
     @property
     def unnamed(self) -> int:
@@ -361,6 +359,7 @@ class DdsGraph:
                 known.found, known.unknown = found, unknown
             for guid in self._of.get(prefix, ()):
                 self._show(guid)
+        self.vendors = frozenset(prefix[:2] for prefix in self._participants)
 
     def put_entities(self, info: ParticipantEntities) -> bool:
         """Update the nodes of a participant; return whether the participant is known."""

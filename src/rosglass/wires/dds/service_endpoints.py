@@ -298,6 +298,11 @@ class ServiceEndpoints:
             if scheme_of(peer.gid) is Scheme.IDENTITY
         ]
 
+    def has_foreign_participants(self) -> bool:
+        """Return whether a participant of the domain does not use Cyclone DDS."""
+        seen = self._participant.seen
+        return seen is not None and not seen.vendors <= {_CYCLONE}
+
     def _describe_peer(self, guid: bytes) -> str:
         """Return the node and vendor of a reader or writer, for messages."""
         nodes = {
@@ -371,8 +376,9 @@ class ServiceEndpoints:
         age = now - self._participant.born
         if seen is None or age < _ANSWERED_S or age >= _SYNC_TIMEOUT_S:
             return age >= _ANSWERED_S
-        foreign_peers = any(scheme_of(guid) is Scheme.IDENTITY for guid in seen.prefixes())
-        return not foreign_peers or (age >= _HEARTBEAT_S and now - seen.moved >= _QUIET_S)
+        if not self.has_foreign_participants():
+            return True
+        return age >= _HEARTBEAT_S and now - seen.moved >= _QUIET_S
 
     def refresh(self) -> None:
         """Look up the matched peers, and report changes."""

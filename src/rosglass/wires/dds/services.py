@@ -122,6 +122,7 @@ class DdsRequester(Requester):
 
     def __init__(self, participant: Participant, graph: Graph, endpoint: EndpointInfo) -> None:
         self._service = endpoint.name
+        self._handling = guarded(_log, "%s: a reply is lost", endpoint.name)
         #: Guards the calls, and sending: replies are received on other threads.
         self._lock = threading.Lock()
         #: A random number in place of rmw_cyclonedds's instance handle; unique in the domain.
@@ -264,7 +265,7 @@ class DdsRequester(Requester):
             server, origin = self._endpoints.find_sender(handle, described)
             if origin is not None and origin.taken:
                 continue
-            with guarded(_log, "%s: a reply is lost", self._service):
+            with self._handling:
                 self._take(None if server is None else server.guid, data, origin)
 
     def _take(self, server: bytes | None, data: bytes | memoryview, origin: Origin | None) -> None:
@@ -419,9 +420,9 @@ class DdsReplier(Replier):
         on_request: OnRequest,
     ) -> None:
         self._service, self._on_request = endpoint.name, on_request
+        self._handling = guarded(_log, "%s: a request is lost", endpoint.name)
         #: Clients whose reply readers were found to be matched since the last change.
         self._matched_clients: set[bytes] = set()
-        self._participant = participant
         #: The newest taken request of each client, by its writer; without Cyclone DDS's clients.
         self._newest: dict[bytes, int] = {}
         #: Origins, by id(), of requests left to the pump, which no request may overtake.
@@ -479,7 +480,7 @@ class DdsReplier(Replier):
             if odd or client is None or self._pumped or not self.quick:
                 self._pumped[id(origin)] = origin
                 return False
-        with guarded(_log, "%s: a request is lost", self._service):
+        with self._handling:
             self._take(client, data, origin)
         return True
 
@@ -488,7 +489,7 @@ class DdsReplier(Replier):
             client, origin = self._endpoints.find_sender(handle, described)
             if origin is not None and origin.taken:
                 continue
-            with guarded(_log, "%s: a request is lost", self._service):
+            with self._handling:
                 if client is not None:
                     self._take(client, data, origin)
                 else:
@@ -543,7 +544,13 @@ class DdsReplier(Replier):
             return answer.client not in self._endpoints.writers.all
         parts = with_header(data, answer.header) if answer.header else (data,)
         try:
-            if answer.header and not self._may_reach_foreign_readers():
+            # RustDDS's clients fail on any reply without identity, even another client's. A
+            # multicast reply reaches their readers before these are discovered here, but not before
+            # their participant is.
+            foreign = not cyclone_identity.writing.problem and (
+                self._endpoints.has_foreign_participants()
+            )
+            if answer.header and not foreign:
                 writer.write_parts(parts)
             elif (
                 not cyclone_identity.write_reply(writer, answer.identity, parts)
@@ -561,18 +568,6 @@ class DdsReplier(Replier):
         if len(self._newest) > _MAX_REMEMBERED:
             here = self._endpoints.writers.by_guid
             self._newest = {guid: last for guid, last in self._newest.items() if guid in here}
-
-    def _may_reach_foreign_readers(self) -> bool:
-        """Return whether a reply may reach a reader that is not of Cyclone DDS.
-
-        RustDDS's clients fail on any reply without identity, even another client's. A multicast
-        reply reaches their readers before these are discovered here, but not before their
-        participant is.
-        """
-        seen = self._participant.seen
-        if seen is None or cyclone_identity.writing.problem:
-            return False
-        return any(scheme_of(prefix) is Scheme.IDENTITY for prefix in seen.prefixes())
 
     def _is_reader_matched(self, answer: _ReplyTarget) -> bool:
         """Return whether the client's reply reader is matched."""

@@ -431,9 +431,10 @@ class ZenohWriter(Declaration, Writer):
 
 def receive_directly(callback: Callable[[Any], None]) -> Any:
     """Run a callback on the receiving thread; only for data of other sessions."""
+    handling = guarded(_log, _FAILURE)  # Zenoh would only print it
 
     def receive(item: Any) -> None:
-        with guarded(_log, _FAILURE):  # Zenoh would only print it
+        with handling:
             callback(item)
 
     return zenoh.handlers.Callback(receive, indirect=False)
@@ -480,11 +481,11 @@ class Pump:
         return not self._thread.is_alive()
 
     def _work(self) -> None:
-        callback = self._callback
+        callback, handling = self._callback, guarded(_log, _FAILURE)
         for received in self._items:
             self.idle, item = False, received
             while item is not None:
-                with guarded(_log, _FAILURE):
+                with handling:
                     callback(item)
                 try:
                     item = self._items.try_recv()
