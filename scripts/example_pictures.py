@@ -23,6 +23,21 @@ PARTNERS = {"figure4": "pose_prediction.py", "figure5": "humanoid.py"}
 #: Seconds until an example shows what it is about, where it is more than usual.
 AFTER = {"replay": 12, "image_publisher": 8, "camera": 8}
 ROSGLASS = [sys.executable, "-m", "rosglass.cli"]
+#: The program with a virtual gamepad, for which it waits until SDL has been started.
+WITH_GAMEPAD = """
+import sys, threading, time
+sys.path.insert(0, "tests/gui")
+from rosglass.cli import main
+def plug():
+    time.sleep(2)
+    from virtual_pads import VirtualPad
+    pads.append(VirtualPad("Wireless Controller"))
+    pads[0].axis(1, -0.7), pads[0].axis(0, -0.25), pads[0].axis(4, -1), pads[0].axis(5, -1)
+    pads[0].button(0), pads[0].button(9)
+pads = []
+threading.Thread(target=plug, daemon=True).start()
+sys.exit(main())
+"""
 #: Pixels left below what an example shows.
 MARGIN = 20
 #: Maximum bytes of a screenshot; larger ones, of camera images, are scaled down until they fit.
@@ -49,8 +64,10 @@ def main(names: list[str]) -> None:
                 folder = CONTROLS if file.parent.name == "controls" else TARGET
                 target, after = folder / f"{file.stem}.png", AFTER.get(file.stem, 4)
                 picture = ["--screenshot", str(target), "--after", str(after)]
-                command = [*ROSGLASS, "run", str(file), "--url", router.url, *picture]
-                subprocess.run(command, check=True)
+                program = [sys.executable, "-c", WITH_GAMEPAD]
+                program = program if file.stem == "gamepad" else ROSGLASS
+                command = [*program, "run", str(file), "--url", router.url, *picture]
+                subprocess.run(command, check=True, cwd=ROOT)
                 shrink(target)
         finally:
             for partner in partners:

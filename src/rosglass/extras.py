@@ -16,6 +16,7 @@ _EXTRA_OF = {
     "cyclonedds": "dds",
     "cv2": "images",
     "av": "video",
+    "sdl2": "gamepad",
     "mcap": "bags",
     "rosbags": "bags",
     "argcomplete": "completion",

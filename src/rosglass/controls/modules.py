@@ -7,6 +7,7 @@ from typing import Any
 
 from rosglass.controls.diagnostics import DiagnosticsTopic
 from rosglass.controls.graph_layout import GraphLayout
+from rosglass.controls.gamepad import Gamepad
 from rosglass.controls.live_topic import LiveTopic
 from rosglass.controls.live_value import LiveValue
 from rosglass.controls.log_topic import LogTopic
@@ -29,6 +30,7 @@ __all__ = ["TYPES", "register"]
 TYPES: dict[str, type[QtCore.QObject]] = {
     "DiagnosticsTopic": DiagnosticsTopic,
     "GraphLayout": GraphLayout,
+    "Gamepad": Gamepad,
     "LiveTopic": LiveTopic,
     "TwistCommand": TwistCommand,
     "LiveValue": LiveValue,

@@ -61,6 +61,7 @@ QtObject {
     // Of the series of a plot, one after another.
     readonly property var series: colors.series
 
+
     // Pixels.
     readonly property real size: scale >= 0.5 && scale <= 8 ? scale : 1
     readonly property int small: Math.round(11 * size)
