@@ -61,6 +61,10 @@ QtObject {
     // Of the series of a plot, one after another.
     readonly property var series: colors.series
 
+    // The same in all modes: an emergency stop is red on yellow.
+    readonly property color emergency: "#e0001b"
+    readonly property color emergencyText: "#ffffff"
+    readonly property color emergencyCollar: "#e8c21c"
 
     // Pixels.
     readonly property real size: scale >= 0.5 && scale <= 8 ? scale : 1
