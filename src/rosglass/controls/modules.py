@@ -8,6 +8,7 @@ from typing import Any
 from rosglass.controls.diagnostics import DiagnosticsTopic
 from rosglass.controls.graph_layout import GraphLayout
 from rosglass.controls.gamepad import Gamepad
+from rosglass.controls.graph_watch import GraphWatch
 from rosglass.controls.live_topic import LiveTopic
 from rosglass.controls.live_value import LiveValue
 from rosglass.controls.log_topic import LogTopic
@@ -31,6 +32,7 @@ TYPES: dict[str, type[QtCore.QObject]] = {
     "DiagnosticsTopic": DiagnosticsTopic,
     "GraphLayout": GraphLayout,
     "Gamepad": Gamepad,
+    "GraphWatch": GraphWatch,
     "LiveTopic": LiveTopic,
     "TwistCommand": TwistCommand,
     "LiveValue": LiveValue,
