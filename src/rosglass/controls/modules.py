@@ -6,8 +6,8 @@ from functools import cache
 from typing import Any
 
 from rosglass.controls.diagnostics import DiagnosticsTopic
-from rosglass.controls.graph_layout import GraphLayout
 from rosglass.controls.gamepad import Gamepad
+from rosglass.controls.graph_layout import GraphLayout
 from rosglass.controls.graph_watch import GraphWatch
 from rosglass.controls.live_topic import LiveTopic
 from rosglass.controls.live_value import LiveValue

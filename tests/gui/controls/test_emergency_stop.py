@@ -113,9 +113,7 @@ def test_a_click_stops_and_a_long_press_releases(controls: Any, wait: Any, latch
     assert latch.commands == [True, False]
 
 
-def test_an_unconfirmed_stop_is_said_and_sent_again(
-    controls: Any, wait: Any, latch: Latch
-) -> None:
+def test_an_unconfirmed_stop_is_said_and_sent_again(controls: Any, wait: Any, latch: Latch) -> None:
     latch.obeys = False
     stop = show(controls, wait)
     wait(lambda: stop.property("known"))
