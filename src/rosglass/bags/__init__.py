@@ -1,11 +1,12 @@
 """Recordings: record topics to a file, and play files back."""
 
 from rosglass.bags.bag import Bag, BagMessage, Channel
-from rosglass.bags.player import Playback, Player, PlayerState, open_bag
-from rosglass.bags.recorder import Recorder, RecordingStatus
+from rosglass.bags.player import Playback, Player, PlayerState, open_bag, read_marks
+from rosglass.bags.recorder import MARKS_TOPIC, Recorder, RecordingStatus
 from rosglass.bags.replay_node import ReplayNode
 
 __all__ = [
+    "MARKS_TOPIC",
     "Bag",
     "BagMessage",
     "Channel",
@@ -16,4 +17,5 @@ __all__ = [
     "RecordingStatus",
     "ReplayNode",
     "open_bag",
+    "read_marks",
 ]

@@ -13,6 +13,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rosglass.bags.recorder import MARKS_TOPIC
 from rosglass.comm import Durability, Handle, QoS
 from rosglass.comm.handle import undo_on_error
 from rosglass.errors import BagError, Error, NodeClosedError
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from rosglass.bags.bag import Bag, BagMessage, Channel
     from rosglass.comm import Node, Publisher
 
-__all__ = ["Playback", "Player", "PlayerState", "PlayerStatus", "open_bag"]
+__all__ = ["Playback", "Player", "PlayerState", "PlayerStatus", "open_bag", "read_marks"]
 
 
 _log = logging.getLogger("rosglass.bags")
@@ -39,6 +40,8 @@ _CLOSE_TIMEOUT_S = 5.0
 _MCAP = b"\x89MCAP0\r\n"
 #: Number of failed messages that are logged for each topic.
 _MAX_LOGGED = 3
+#: Event marks of a recording that are read.
+_MAX_MARKS = 1000
 
 
 class PlayerState(Enum):
@@ -661,6 +664,33 @@ def open_bag(path: str | os.PathLike[str]) -> Bag:
         if not (found.is_file() and _starts_with(found, MAGIC)):
             raise
     return Ros1CutBag(found)
+
+
+def read_marks(path: str | os.PathLike[str]) -> list[tuple[float, str]]:
+    """Return the event marks of a recording: seconds since its start, and texts.
+
+    Without an index of its topics, the whole file is read. At most 1000 are returned.
+
+    Raises:
+        BagError: It cannot be read.
+    """
+    found: list[tuple[float, str]] = []
+    bag = open_bag(path)
+    try:
+        marks = [
+            channel
+            for channel in bag.channels
+            if channel.topic == MARKS_TOPIC and channel.type_name == "std_msgs/msg/String"
+        ]
+        kinds = {channel: channel.type() for channel in marks}
+        for message in bag.messages(marks) if marks else ():
+            text = kinds[message.channel].decode(message.data, wire=message.channel.wire).data
+            found.append(((message.time - bag.start) / _NS, text))
+            if len(found) >= _MAX_MARKS:
+                break
+    finally:
+        bag.close()
+    return found
 
 
 def _starts_with(path: Path, magic: bytes) -> bool:

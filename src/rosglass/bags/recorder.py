@@ -13,20 +13,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from rosglass.comm import IMMEDIATE, Handle, QoS
+from rosglass.comm import IMMEDIATE, Handle, QoS, Sample
 from rosglass.comm.names import similar
 from rosglass.errors import BagError, Error, NodeClosedError
-from rosglass.messages import OpaqueType
+from rosglass.messages import MessageType, OpaqueType, load
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterable
 
     from rosglass.bags.bag import RecordingFile
-    from rosglass.comm import Node, Promise, Sample, Subscription
-    from rosglass.messages import MessageType
+    from rosglass.comm import Node, Promise, Subscription
 
-__all__ = ["DEFAULT_COMPRESSION", "Recorder", "RecordingStatus", "create"]
+__all__ = ["DEFAULT_COMPRESSION", "MARKS_TOPIC", "Recorder", "RecordingStatus", "create"]
+
+#: Topic of the event marks in a recording, of type std_msgs/String.
+MARKS_TOPIC = "/recording/marks"
 
 
 #: The compressions of each format, and its default.
@@ -86,6 +88,8 @@ _DEPTH = 1000
 _FETCH_TIMEOUT_S, _LAST_FETCH_TIMEOUT_S = 5.0, 2.0
 #: Seconds that closing waits for received messages to be written.
 _CLOSE_TIMEOUT_S = 60.0
+_LONGEST_MARK = 1000
+_MARKS_PUBLISHER = b"/recorder"
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +102,8 @@ class RecordingStatus:
         size: Size of the file in bytes.
         duration: Seconds since the start.
         problems: Why topics are not recorded, by topic.
+        ended: Why nothing more is recorded: a limit was reached; empty while recording.
+        marks: Number of event marks.
     """
 
     topics: dict[str, int]
@@ -105,6 +111,8 @@ class RecordingStatus:
     size: int
     duration: float
     problems: dict[str, str]
+    ended: str = ""
+    marks: int = 0
 
     @property
     def messages(self) -> int:
@@ -133,6 +141,9 @@ class Recorder(Handle):
             ``zstd`` in MCAP and ``none`` in ROS 1 bags, as with ``rosbag record``.
         memory: Bytes of messages that may wait for the disk or for their type; further ones are
             dropped, counted and logged.
+        max_size: Bytes of the file after which nothing more is recorded; exceeded by what is
+            written at once, about a megabyte. 0 for no limit.
+        max_duration: Seconds after which nothing more is recorded; 0 for no limit.
 
     Raises:
         BagError: The file cannot be written, or an argument is invalid.
@@ -150,9 +161,14 @@ class Recorder(Handle):
         hidden: bool = False,
         compression: str = "",
         memory: int = 256 * 2**20,
+        max_size: int = 0,
+        max_duration: float = 0.0,
     ) -> None:
         if isinstance(topics, str):
             raise BagError(f"topics are given as a list, e.g. [{topics!r}]")
+        for name, limit in (("max_size", max_size), ("max_duration", max_duration)):
+            if not 0 <= limit < float("inf"):
+                raise BagError(f"{name} must be a number from 0 (no limit), got {limit!r}")
         self.path = Path(path)
         self._node, self._memory, self._hidden = node, memory, hidden
         self._ros2 = node.wire == "cdr"
@@ -163,8 +179,12 @@ class Recorder(Handle):
         self._queue: deque[tuple[str, Sample]] = deque()
         self._waiting = self._dropped = self._size = 0
         self._lost: dict[str, int] = {}
-        self._failure = ""
+        self._failure = self._ended = ""
+        self._max_size, self._max_duration = max_size, max_duration
+        self._marks = 0
         self._started = time.monotonic()
+        #: When it ended by itself.
+        self._ended_at: float | None = None
         self._subscriptions: dict[tuple[str, str], Subscription] = {}
         self._begun: set[tuple[str, str]] = set()
         self._failed: dict[str, str] = {}
@@ -204,8 +224,35 @@ class Recorder(Handle):
             for topic in sorted(self._topics - types.keys() - problems.keys()):
                 problems[topic] = f"no publisher{self._find_similar(topic)}"
             counts = {topic: self._counts.get(topic, 0) for topic in sorted(types)}
-            duration = time.monotonic() - self._started
-            return RecordingStatus(counts, self._dropped, self._size, duration, problems)
+            counts.pop(MARKS_TOPIC, None)
+            duration = (self._ended_at or time.monotonic()) - self._started
+            return RecordingStatus(
+                counts, self._dropped, self._size, duration, problems, self._ended, self._marks
+            )
+
+    def mark(self, text: str) -> None:
+        """Write an event mark with the present time: a message of :data:`MARKS_TOPIC`.
+
+        Args:
+            text: Its text, at most 1000 characters.
+
+        Raises:
+            BagError: The text is too long, or nothing more is recorded.
+        """
+        if not isinstance(text, str) or len(text) > _LONGEST_MARK:
+            raise BagError(f"a mark is a text of at most {_LONGEST_MARK} characters")
+        if self._failure or self._ended or self._closed:
+            raise BagError(self._failure or self._ended or f"{self.path} is complete")
+        kind = load("std_msgs/msg/String", ros=2 if self._ros2 else 1)
+        assert isinstance(kind, MessageType)
+        now, wire = time.time_ns(), self._node.wire
+        data = bytes(kind.encode({"data": text}, wire=wire))
+        sample = Sample(data, wire, kind, now, now, _MARKS_PUBLISHER)
+        with self._lock:
+            self._marks += 1
+            self._waiting += len(data)
+            self._queue.append((MARKS_TOPIC, sample))
+            self._lock.notify_all()
 
     def close(self) -> None:
         """Stop, write what was received, and complete the file; safe to call twice.
@@ -298,7 +345,7 @@ class Recorder(Handle):
     def _receive(self, topic: str, sample: Sample) -> None:
         size = len(sample.data)
         with self._lock:
-            if self._failure:
+            if self._failure or self._ended:
                 return
             if self._waiting + size > self._memory and self._queue:
                 self._dropped += 1
@@ -315,7 +362,7 @@ class Recorder(Handle):
                 with self._lock:
                     self._lock.wait_for(
                         lambda: self._queue or self._closed or self._fetched_types(),
-                        flush_at - time.monotonic(),
+                        min(flush_at, self._ends_at()) - time.monotonic(),
                     )
                     batch, closed = list(self._queue), self._closed
                     self._queue.clear()
@@ -336,6 +383,7 @@ class Recorder(Handle):
                     self._file.flush()
                     flush_at = time.monotonic() + _FLUSH_INTERVAL_S
                 self._size = self._file.size()
+                self._check_limits()
                 if closed and not batch:
                     break
             self._file.finish()
@@ -346,6 +394,23 @@ class Recorder(Handle):
             _log.error(self._failure, exc_info=not isinstance(error, OSError))
             with suppress(OSError):  # the disk is still full
                 self._file.close()
+
+    def _ends_at(self) -> float:
+        """Return the monotonic time of its end; infinite without a limit."""
+        if not self._max_duration or self._ended:
+            return float("inf")
+        return self._started + self._max_duration
+
+    def _check_limits(self) -> None:
+        now, reason = time.monotonic(), ""
+        if self._max_size and self._size >= self._max_size:
+            reason = f"the limit of {self._max_size / 1e6:g} MB is reached"
+        elif self._max_duration and now - self._started >= self._max_duration:
+            reason = f"the limit of {self._max_duration:g} s is reached"
+        if reason and not self._ended:
+            with self._lock:
+                self._ended, self._ended_at = reason, now
+                self._queue.clear()
 
     def _hold(self, topic: str, sample: Sample) -> bool:
         """Hold a message whose definition is being fetched; return whether it is held."""

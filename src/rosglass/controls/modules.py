@@ -20,6 +20,7 @@ from rosglass.controls.node_parameters import NodeParameters
 from rosglass.controls.plot import PlotData, PlotSeries
 from rosglass.controls.plot_lines import PlotLines
 from rosglass.controls.tf_rows import TfRows
+from rosglass.controls.topic_recorder import TopicRecorder
 from rosglass.controls.topic_rows import TopicRows
 from rosglass.controls.twist_command import TwistCommand
 from rosglass.controls.window_keys import WindowKeys
@@ -49,6 +50,7 @@ TYPES: dict[str, type[QtCore.QObject]] = {
     "PlotData": PlotData,
     "PlotLines": PlotLines,
     "PlotSeries": PlotSeries,
+    "TopicRecorder": TopicRecorder,
 }
 
 

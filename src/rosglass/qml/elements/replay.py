@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING, Any
 
 import rosglass
@@ -10,6 +11,7 @@ from rosglass.errors import Error
 from rosglass.qml.elements.element import Element
 from rosglass.qml.elements.singleton import strings
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
+from rosglass.qml.engine.session import result_of, weak_callback
 from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -106,6 +108,7 @@ class Replay(Element):
     playingChanged = Signal()
     positionChanged = Signal()
     durationChanged = Signal()
+    marksChanged = Signal()
 
     file = Writable(
         str, "", lambda path: QtCore.QUrl(path).toLocalFile() if path[:5] == "file:" else path
@@ -127,6 +130,8 @@ class Replay(Element):
     topics = Writable(QJSValue, (), _topic_names, read="_get_topics")
     toRobot = Writable(bool, False)
     ready = ReadOnly(bool, False)
+    #: The event marks: ``{time, text}`` of each, in seconds from the beginning.
+    marks = ReadOnly(QJSValue, read="_get_marks")
 
     _HOLDS = ("_playback",)
     _topics: tuple[str, ...]
@@ -145,6 +150,7 @@ class Replay(Element):
         #: The key of this element where the element itself must not be kept alive.
         self._user = object()
         self._playback: Playback | None = None
+        self._marks: list[tuple[float, str]] = []
 
     def _get_rate(self) -> float:
         if self._playback is not None:
@@ -183,6 +189,12 @@ class Replay(Element):
     def _get_topics(self) -> QJSValue:
         runtime = self._find_runtime()
         return QJSValue() if runtime is None else runtime.value(list(self._topics))
+
+    def _get_marks(self) -> QJSValue:
+        runtime = self._find_runtime()
+        if runtime is None:
+            return QJSValue()
+        return runtime.value([{"time": time, "text": text} for time, text in self._marks])
 
     # Controlling.
 
@@ -283,13 +295,32 @@ class Replay(Element):
         if position is not None:
             self._set_position(position)
         self._play_or_pause()
+        self._read_marks(playback)
         report(self, ready=True)
 
     def _on_closed(self, endpoint: Playback | None) -> None:  # noqa: ARG002 - the base's signature
         playback, self._playback = self._playback, None
         if playback is not None:
             self._refresh()
+            self._show_marks(None, [])
             report(self, ready=False)
+
+    def _read_marks(self, playback: Playback) -> None:
+        """Read the marks in a thread of its own: without an index, that takes long."""
+        assert self._session is not None
+        post, show = self._session.executor.post, weak_callback(self._show_marks)
+
+        def read() -> None:
+            found = result_of(lambda: rosglass.bags.read_marks(playback.path), "reading marks")
+            if not isinstance(found, Error):
+                post(lambda: show(playback, found))
+
+        threading.Thread(target=read, name="marks of a recording", daemon=True).start()
+
+    def _show_marks(self, playback: Playback | None, marks: list[tuple[float, str]]) -> None:
+        if is_alive(self) and playback is self._playback and marks != self._marks:
+            self._marks = marks
+            self.marksChanged.emit()
 
     # Watching.
 

@@ -7,7 +7,7 @@ T.Switch {
 
     property color tint: Theme.accent
 
-    implicitWidth: indicator.width + (text ? label.implicitWidth + Theme.gap : 0)
+    implicitWidth: text ? label.implicitWidth : indicator.width
     implicitHeight: Theme.touch
     focusPolicy: Qt.StrongFocus
     Accessible.role: Accessible.CheckBox

@@ -1,0 +1,212 @@
+// The time of a recording that an interface shows: play, pause, drag, speed, loop, and its event marks.
+import QtQml 2.15 as Qml
+import QtQuick 2.15
+import QtQuick.Templates 2.15 as T
+import Ros2 1.0
+import RosControls 1.0
+
+LiveFrame {
+    id: timeline
+
+    // The recording that replaces the robot; empty for that of `rosglass run --url replay:...`.
+    property string file
+    // A Replay to control instead of the timeline's own one.
+    property var replay: null
+    // Speeds to choose from.
+    property var rates: [0.1, 0.25, 0.5, 1, 2, 4, 10]
+    // Seconds by which the arrow keys move; ten times as many with Shift.
+    property real step: 1
+
+    // Whether there is a recording, and whether it is played.
+    readonly property bool ready: !!replay_ && replay_.ready
+    readonly property bool playing: !!replay_ && replay_.playing
+    // Seconds.
+    readonly property real position: replay_ ? replay_.position : 0
+    readonly property real duration: replay_ ? replay_.duration : 0
+    // {time, text} of each event mark of the recording.
+    readonly property var marks: replay_ && replay_.marks ? replay_.marks : []
+
+    readonly property var replay_: replay ? replay : own.item ? own.item.replay : null
+
+    function play() { if (replay_) replay_.playing = true }
+    function pause() { if (replay_) replay_.playing = false }
+    function toggle() { playing ? pause() : play() }
+    // Moves to a position in seconds; one beyond the ends, to that end.
+    function seek(seconds) {
+        if (ready && isFinite(seconds))
+            replay_.seek(Math.max(0, Math.min(duration, seconds)))
+    }
+    // Moves to the next event mark; with -1, to the one before.
+    function seekMark(direction) {
+        const times = marks.map(mark => mark.time).sort((a, b) => a - b)
+        const found = direction < 0 ? times.filter(time => time < position - 0.5).pop() : times.filter(time => time > position + 0.05)[0]
+        if (found !== undefined)
+            seek(found)
+    }
+
+    function time_(seconds) {
+        const two = value => (value < 10 ? "0" : "") + value
+        const tenths = Math.floor(seconds * 10 + 1e-6), whole = Math.floor(tenths / 10), hours = Math.floor(whole / 3600)
+        return (hours ? hours + ":" : "") + two(Math.floor(whole / 60) % 60) + ":" + two(whole % 60) + "." + tenths % 10
+    }
+    function faster_(by) {
+        if (!replay_)
+            return
+        const sorted = rates.slice().sort((a, b) => a - b)
+        const at = by > 0 ? sorted.filter(rate => rate > replay_.rate)[0] : sorted.filter(rate => rate < replay_.rate).pop()
+        if (at !== undefined)
+            replay_.rate = at
+    }
+
+    title: qsTr("Recording")
+    stale: false
+    problem: replay_ && replay_.problem ? replay_.problem.slice(0, 300) : !ready && (file || replay) ? qsTr("NO RECORDING YET") : ""
+    note: !ready ? (problem ? "" : qsTr("no recording is shown")) : playing ? (replay_.rate !== 1 ? qsTr("playing, %1 x").arg(replay_.rate) : qsTr("playing")) : qsTr("PAUSED")
+    contentWidth: 420 * Theme.size
+    contentHeight: slider.height + row.height + Theme.gap / 2
+    activeFocusOnTab: true
+    Accessible.description: status || qsTr("%1 of %2").arg(time_(position)).arg(time_(duration))
+
+    Keys.onPressed: function(event) {
+        const far = step * (event.modifiers & Qt.ShiftModifier ? 10 : 1)
+        event.accepted = true
+        if (event.key === Qt.Key_Space)
+            toggle()
+        else if (event.key === Qt.Key_Left)
+            seek(position - far)
+        else if (event.key === Qt.Key_Right)
+            seek(position + far)
+        else if (event.key === Qt.Key_Home)
+            seek(0)
+        else if (event.key === Qt.Key_End)
+            seek(duration)
+        else if (event.key === Qt.Key_PageUp)
+            seekMark(-1)
+        else if (event.key === Qt.Key_PageDown)
+            seekMark(1)
+        else if (event.key === Qt.Key_Plus || event.key === Qt.Key_Minus)
+            faster_(event.key === Qt.Key_Plus ? 1 : -1)
+        else if (event.key === Qt.Key_L && replay_)
+            replay_.loop = !replay_.loop
+        else
+            event.accepted = false
+    }
+
+    Loader {
+        id: own
+        active: !timeline.replay
+        sourceComponent: Item {
+            property alias replay: source
+            Replay { id: source; file: timeline.file }
+        }
+    }
+    // At most twenty jumps a second while dragging, and the last one in any case.
+    Timer {
+        id: jump
+        interval: 50
+        property real target: NaN
+        onTriggered: {
+            const to = target
+            target = NaN
+            timeline.seek(to)
+        }
+    }
+
+    ThemeSlider {
+        id: slider
+        objectName: "slider"
+        anchors { left: parent.left; right: parent.right }
+        enabled: timeline.ready
+        name: qsTr("Time of the recording")
+        to: Math.max(0.001, timeline.duration)
+        // The keys are those of the timeline.
+        Keys.forwardTo: [timeline]
+        onMoved: {
+            jump.target = value
+            if (!jump.running)
+                jump.start()
+        }
+        Qml.Binding { target: slider; property: "value"; value: timeline.position; when: !slider.pressed && !jump.running; restoreMode: Qml.Binding.RestoreNone }
+
+        Repeater {
+            model: timeline.marks
+            delegate: Rectangle {
+                objectName: "mark_" + index
+                x: slider.leftPadding + slider.availableWidth * Math.max(0, Math.min(1, modelData.time / slider.to)) - width / 2
+                y: 0
+                width: 3
+                height: slider.height / 2 - 2
+                color: Theme.warn
+                Accessible.role: Accessible.StaticText
+                Accessible.name: qsTr("%1: %2").arg(timeline.time_(modelData.time)).arg(modelData.text.slice(0, 100))
+                MouseArea {
+                    anchors { fill: parent; margins: -4 }
+                    hoverEnabled: true
+                    onContainsMouseChanged: hint.text = containsMouse ? parent.Accessible.name : ""
+                    onClicked: timeline.seek(modelData.time)
+                }
+            }
+        }
+    }
+    Row {
+        id: row
+        anchors { left: parent.left; right: parent.right; top: slider.bottom; topMargin: Theme.gap / 2 }
+        spacing: Theme.gap
+
+        ThemeButton {
+            objectName: "play"
+            width: 80 * Theme.size
+            text: timeline.playing ? qsTr("Pause") : qsTr("Play")
+            enabled: timeline.ready
+            onClicked: timeline.toggle()
+        }
+        ThemeButton {
+            objectName: "previous"
+            text: "⏮"
+            visible: timeline.marks.length > 0
+            enabled: timeline.ready
+            Accessible.name: qsTr("Previous mark")
+            onClicked: timeline.seekMark(-1)
+        }
+        ThemeButton {
+            objectName: "next"
+            text: "⏭"
+            visible: timeline.marks.length > 0
+            enabled: timeline.ready
+            Accessible.name: qsTr("Next mark")
+            onClicked: timeline.seekMark(1)
+        }
+        ThemeChoice {
+            objectName: "rate"
+            width: 80 * Theme.size
+            enabled: timeline.ready
+            name: qsTr("Speed")
+            model: timeline.rates.map(rate => qsTr("%1 x").arg(rate))
+            currentIndex: timeline.replay_ ? timeline.rates.indexOf(timeline.replay_.rate) : -1
+            displayText: timeline.replay_ ? qsTr("%1 x").arg(timeline.replay_.rate) : ""
+            onActivated: function(index) { timeline.replay_.rate = timeline.rates[index] }
+        }
+        ThemeSwitch {
+            id: loop
+            objectName: "loop"
+            text: qsTr("Loop")
+            enabled: timeline.ready
+            onToggled: timeline.replay_.loop = checked
+            Qml.Binding { target: loop; property: "checked"; value: !!timeline.replay_ && timeline.replay_.loop; restoreMode: Qml.Binding.RestoreNone }
+        }
+        ThemeText {
+            objectName: "time"
+            anchors.verticalCenter: parent.verticalCenter
+            text: qsTr("%1 / %2").arg(timeline.time_(timeline.position)).arg(timeline.time_(timeline.duration))
+            color: timeline.ready ? Theme.text : Theme.dim
+        }
+        ThemeText {
+            id: hint
+            anchors.verticalCenter: parent.verticalCenter
+            width: Math.max(0, Math.min(implicitWidth, row.width - x))
+            color: Theme.warn
+            font.pixelSize: Theme.small
+        }
+    }
+    FocusRing { visible: timeline.activeFocus }
+}
