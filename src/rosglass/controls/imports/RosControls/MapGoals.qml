@@ -32,6 +32,7 @@ QtObject {
     property var handle_: null
     property var publishers_: ({})
     property int number_: 0
+    property bool accepted_: false
 
     function within_(name) {
         return ns && name.charAt(0) !== "/" ? ns.replace(/\/+$/, "") + "/" + name : name
@@ -126,7 +127,7 @@ QtObject {
         const isCurrent = () => number === goals.number_
         const client = Ros2.createActionClient(action, type)
         text = qsTr("sending …")
-        bad = cancelling = false
+        bad = cancelling = accepted_ = false
         distance = NaN
         reached = 0
         poses = list
@@ -134,12 +135,15 @@ QtObject {
         try {
             handle_ = client.sendGoalAsync(goal, {
                 onGoalResponse: function(handle) {
-                    if (isCurrent() && handle)
+                    if (!isCurrent())
+                        return
+                    goals.accepted_ = !!handle
+                    if (handle)
                         goals.text = qsTr("accepted")
                 },
                 onFeedback: function(handle, feedback) {
                     if (isCurrent())
-                        goals.follow_(feedback)
+                        goals.follow_(feedback, client.actionType)
                 },
                 onResult: function(result) {
                     if (isCurrent())
@@ -159,16 +163,17 @@ QtObject {
         }
         return true
     }
-    function follow_(feedback) {
+    function follow_(feedback, type) {
         if (!active)
             return
-        if (feedback.distance_remaining !== undefined)
+        // Reading a field that a type does not have is logged.
+        if (/NavigateToPose|NavigateThroughPoses/.test(type))
             distance = feedback.distance_remaining
-        else if (feedback.base_position !== undefined && poses.length === 1)
+        if (/MoveBase/.test(type) && poses.length === 1)
             distance = Math.hypot(feedback.base_position.pose.position.x - poses[0].x, feedback.base_position.pose.position.y - poses[0].y)
-        if (feedback.current_waypoint !== undefined)
+        if (/FollowWaypoints/.test(type))
             reached = feedback.current_waypoint
-        else if (feedback.number_of_poses_remaining !== undefined)
+        if (/NavigateThroughPoses/.test(type))
             reached = Math.max(0, poses.length - feedback.number_of_poses_remaining)
         if (cancelling)
             return
@@ -180,11 +185,13 @@ QtObject {
         bad = false
     }
     function end_(result) {
-        const missed = result.result && result.result.missed_waypoints ? result.result.missed_waypoints.length : 0
-        const reason = result.reason || (result.result && result.result.error_msg) || ""
+        const has = name => result.result && Object.keys(result.result).indexOf(name) >= 0
+        const missed = has("missed_waypoints") ? result.result.missed_waypoints.length : 0
+        const reason = result.reason || (has("error_msg") ? result.result.error_msg : "")
         text = result.code === 4 && missed ? qsTr("reached, without %1 of the waypoints").arg(missed)
              : result.code === 4 ? qsTr("reached")
              : result.code === 5 ? qsTr("cancelled")
+             : result.code === 6 && !accepted_ ? qsTr("refused: %1").arg(reason)
              : result.code === 6 ? (reason ? qsTr("not reached: %1").arg(reason) : qsTr("not reached"))
              : qsTr("outcome unknown: %1").arg(reason)
         text = text.slice(0, 300)

@@ -61,7 +61,7 @@ LiveFrame {
     }
     function sendWaypoints() {
         if (goals_.sendWaypoints(waypoints))
-            waypoints = []
+            tool = ""
     }
 
     property bool fitted_: false
