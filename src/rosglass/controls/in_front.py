@@ -43,7 +43,9 @@ def obstruction(item: QtQuick.QQuickItem | QtGui.QWindow | None) -> str:
             return "a dialog is open"
         # Overlays are drawn in an offscreen window for RViz's.
         window = QtQuick.QQuickRenderControl.renderWindowFor(window) or window
-    if not window.isExposed():
+    # The state as well: without a window manager, a minimised window stays exposed.
+    minimised = window.windowState() == QtCore.Qt.WindowState.WindowMinimized
+    if minimised or not window.isExposed():
         return "the window is not visible"
     focus = QtGui.QGuiApplication.focusWindow()
     # Not isActive(), which is also true behind a dialog of the window.

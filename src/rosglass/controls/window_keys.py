@@ -44,11 +44,9 @@ class WindowKeys(QtCore.QObject):
         self._kept: list[Any] = []
         #: Keys whose release may be one of a repeat -> ticks until it counts.
         self._leaving: dict[int, int] = {}
-        kinds, modifiers = QtCore.QEvent.Type, QtCore.Qt.KeyboardModifier
+        kinds = QtCore.QEvent.Type
         self._press, self._release = kinds.KeyPress, kinds.KeyRelease
-        self._shortcuts = modifiers.ControlModifier | modifiers.AltModifier | modifiers.MetaModifier
         self._timer = QtCore.QTimer(self)
-        self._timer.setTimerType(QtCore.Qt.TimerType.PreciseTimer)
         self._timer.setInterval(_TICK_MS)
         self._timer.timeout.connect(self._tick)
         app: Any = QtCore.QCoreApplication.instance()
@@ -99,13 +97,14 @@ class WindowKeys(QtCore.QObject):
             if not event.isAutoRepeat():
                 self._leaving[key] = _TICKS
                 if not self._timer.isActive():
+                    self._timer.setTimerType(QtCore.Qt.TimerType.PreciseTimer)
                     self._timer.start()
             return key in self._held
         repeats = self._leaving.pop(key, None) is not None or event.isAutoRepeat()
         if key in self._held:
             return True
         # A repeat of a key that is not held: it was pressed in another window, or a text field.
-        if repeats or not self.enabled or event.modifiers() & self._shortcuts or self._is_text():
+        if repeats or not self.enabled or _is_shortcut(event) or self._is_text():
             return False
         report(self, held=[*self._held, key])
         self.pressed.emit(key)
@@ -136,3 +135,10 @@ class WindowKeys(QtCore.QObject):
         for key in gone:
             if is_alive(self):
                 self.released.emit(key)
+
+
+def _is_shortcut(event: Any) -> bool:
+    # Not earlier: PySide creates all of Qt's enumerations with the first one, in 11 ms.
+    kinds = QtCore.Qt.KeyboardModifier
+    shortcuts = kinds.ControlModifier | kinds.AltModifier | kinds.MetaModifier
+    return bool(event.modifiers() & shortcuts)

@@ -123,11 +123,13 @@ class Drive:
 
     def stops(self, reason: str = "") -> None:
         """The robot gets three zeros, and then nothing."""
-        self.wait(lambda: self.robot.zeros >= 3 and self.silent())
-        self.wait.settled(self.controls._bench.session)
-        count = len(self.robot.speeds)
-        self.wait.nothing_happens(0.15)
-        assert len(self.robot.speeds) == count
+
+        def is_silent() -> bool:
+            count = len(self.robot.speeds)
+            self.wait.nothing_happens(0.15)
+            return self.silent() and len(self.robot.speeds) == count
+
+        self.wait(lambda: self.robot.zeros >= 3 and is_silent())
         assert not self.command.active
         if reason:
             assert [one for one in self.reasons() if reason in one]

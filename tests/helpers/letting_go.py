@@ -1,0 +1,471 @@
+"""A screen that steers a robot, and every way to let go of it; for the test and the benchmark.
+
+As a program, ``letting_go.py FILE URL`` shows the screen and runs lines of its standard input. As a
+module, :class:`Screen` starts it, :class:`Robot` keeps what arrives, :data:`WAYS` are the ways.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from waiting import eventually, nothing_happens
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+#: Size of the window, which is at the upper left of the screen; and the stick in it.
+_SIZE, _STICK = (600, 400), (100, 100)
+#: Seconds without a message after which nothing is sent any more: zeros are up to 0.1 s apart.
+_SILENCE_S = 0.5
+SCREEN = """import QtQuick 2.15
+import QtQuick.Window 2.15
+import QtQuick.Templates 2.15 as T
+import Ros2 1.0
+import RosControls 1.0
+
+Window {
+    id: window
+    objectName: "window"
+    x: 0; y: 0; width: 600; height: 400
+    visible: true
+    property int version: 1
+    Component.onCompleted: Ros2.init("screen")
+    TwistCommand {
+        id: drive
+        objectName: "command"
+        topic: "cmd_vel"; acceleration: 0; deceleration: 0; turnAcceleration: 0
+        onHalted: function (reason) { console.log("HALTED " + reason) }
+    }
+    Item {
+        id: page
+        objectName: "page"
+        anchors.fill: parent
+        DriveStick { objectName: "stick"; width: 200; height: 200; command: drive }
+        DriveKeys { objectName: "keys"; x: 300; y: 200; command: drive }
+        Loader {
+            id: loader
+            objectName: "loader"
+            x: 300; width: 100; height: 100
+            sourceComponent: Item { objectName: "code" }
+        }
+    }
+    // An input made of code, which steers until it is released.
+    property bool pushed: false
+    property bool wrong: false
+    Timer {
+        interval: 40; repeat: true; running: window.pushed; triggeredOnStart: true
+        onTriggered: {
+            if (loader.item)
+                drive.steer(loader.item, 1, 0)
+            if (window.wrong)
+                nothing.here()
+        }
+    }
+    onPushedChanged: if (!pushed && loader.item) drive.release(loader.item)
+    // Seconds to compute for, from the event loop.
+    property real work: 0
+    Timer {
+        interval: 1; running: window.work > 0
+        onTriggered: {
+            const end = Date.now() + 1000 * window.work
+            window.work = 0
+            while (Date.now() < end) ;
+        }
+    }
+    T.Popup { id: popup; objectName: "popup"; modal: true; x: 250; width: 50; height: 50 }
+    Window { objectName: "other"; x: 620; width: 100; height: 100; title: "other" }
+    Window {
+        objectName: "dialog"
+        x: 620; width: 100; height: 100
+        modality: Qt.ApplicationModal; transientParent: window
+    }
+}
+"""
+
+
+@contextmanager
+def stays_connected(display: str) -> Iterator[None]:
+    """Keep a client on an X server, which begins anew when the last one has left."""
+    client = subprocess.Popen(["xdotool", "sleep", "3600"], env={**os.environ, "DISPLAY": display})
+    try:
+        yield
+    finally:
+        client.kill()
+        client.wait()
+
+
+class Robot:
+    """Keeps what arrives at a robot: the time, by the system's steady clock, and the speed."""
+
+    def __init__(self, node: Any, topic: str = "/cmd_vel") -> None:
+        self.received: list[tuple[float, float]] = []
+        self.subscription = node.create_subscription(
+            topic, "geometry_msgs/msg/Twist", self._on_message
+        )
+
+    def _on_message(self, message: Any) -> None:
+        now = time.monotonic()
+        self.received.append((now, abs(message.linear.x) + abs(message.angular.z)))
+
+    @property
+    def moves(self) -> bool:
+        """True while it moves."""
+        return bool(self.received) and self.received[-1][1] > 0
+
+    @property
+    def zeros(self) -> int:
+        """The number of zeros since it moved last."""
+        count = 0
+        for _, speed in reversed(self.received):
+            if speed:
+                break
+            count += 1
+        return count
+
+    def last_motion(self) -> float:
+        """Return when it was moved last."""
+        return max((at for at, speed in self.received if speed), default=0.0)
+
+
+class Screen:
+    """The program; every request returns when it was carried out, by the steady clock."""
+
+    def __init__(self, url: str, display: str, folder: Path) -> None:
+        self.display, self.file = display, folder / "Main.qml"
+        self.file.write_text(SCREEN)
+        self._env = {**os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
+        self._env |= {"PYTHONUNBUFFERED": "1", "QT_QUICK_BACKEND": "software"}
+        self._process = subprocess.Popen(
+            [sys.executable, __file__, str(self.file), url],
+            env=self._env,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            bufsize=1,
+        )
+        self.lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self._wait_until_ready(0)
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            self.lines.append(line.rstrip())
+
+    def _wait_until_ready(self, since: int) -> None:
+        eventually(lambda: "READY" in self.lines[since:], lambda: self.text, timeout=60)
+
+    def reset(self) -> None:
+        """Undo what the ways to let go did."""
+        self.x11("mouseup", 1, "keyup", "w", "mousemove", *_STICK)
+        since = len(self.lines)
+        self.ask("reset()")
+        self._wait_until_ready(since)
+
+    @property
+    def text(self) -> str:
+        """All that it has written."""
+        return "\n".join(self.lines)
+
+    def ask(self, request: str) -> float:
+        """Have a line of Python run on the GUI thread; return when it began."""
+        assert self._process.stdin is not None
+        count = len(self.lines)
+        self._process.stdin.write(f"{request}\n")
+        self._process.stdin.flush()
+
+        def began() -> float:
+            found = [line for line in self.lines[count:] if line.startswith("BEGIN ")]
+            return float(found[0].split()[1]) if found else 0.0
+
+        return float(eventually(began, lambda: self.text, turn=lambda: time.sleep(0.001)))
+
+    def x11(self, *words: object) -> float:
+        """Run xdotool; return when it began."""
+        began = time.monotonic()
+        subprocess.run(["xdotool", *map(str, words)], env=self._env, check=True, timeout=30)
+        return began
+
+    def signal(self, number: int) -> float:
+        """Send a signal to the program."""
+        began = time.monotonic()
+        self._process.send_signal(number)
+        return began
+
+    def is_running(self) -> bool:
+        """Return whether the program runs."""
+        return self._process.poll() is None
+
+    def close(self) -> None:
+        """End it in any case."""
+        if self._process.poll() is None:
+            self._process.kill()
+        self._process.wait(10)
+        self._reader.join(5)
+
+
+# -- holding, and letting go ---------------------------------------------------------------------
+
+
+def drag(screen: Screen) -> None:
+    """Pull the stick ahead with the mouse."""
+    x, y = _STICK
+    screen.x11("mousemove", x, y, "mousedown", 1, "mousemove", x, y - 60)
+
+
+def press(screen: Screen) -> None:
+    """Hold W."""
+    screen.x11("keydown", "w")
+
+
+def push(screen: Screen) -> None:
+    """Steer by code."""
+    screen.ask("set('window', 'pushed', True)")
+
+
+def touch(screen: Screen) -> None:
+    """Pull the stick ahead with a finger."""
+    screen.ask("touch('press', 100, 100)")
+    screen.ask("touch('move', 100, 40)")
+
+
+class Way(NamedTuple):
+    """A way to let go.
+
+    Attributes:
+        hold: How the robot is steered before.
+        let_go: Does it; returns when it began.
+        ends: Whether the program ends by it.
+        limit_s: Seconds within which the last motion is sent.
+    """
+
+    hold: Callable[[Screen], None]
+    let_go: Callable[[Screen], float]
+    ends: bool = False
+    limit_s: float = 0.05
+
+
+def _asks(request: str) -> Callable[[Screen], float]:
+    return lambda screen: screen.ask(request)
+
+
+def _sends(number: int) -> Callable[[Screen], float]:
+    return lambda screen: screen.signal(number)
+
+
+def _reload(screen: Screen) -> float:
+    since = len(screen.lines)
+    screen.file.write_text(SCREEN.replace("version: 1", f"version: {since}"))
+
+    def began() -> float:
+        found = [line for line in screen.lines[since:] if line.startswith("RELOADING ")]
+        return float(found[0].split()[1]) if found else 0.0
+
+    return float(eventually(began, turn=lambda: time.sleep(0.001)))
+
+
+def _stop_and_continue(screen: Screen) -> float:
+    began = screen.signal(signal.SIGSTOP)
+    nothing_happens(1.0)
+    screen.signal(signal.SIGCONT)
+    return began
+
+
+def _second_input(screen: Screen) -> float:
+    """A second input does not change what the first one does; letting go of the first halts."""
+    screen.ask("set('window', 'pushed', True)")
+    nothing_happens(0.2)
+    return screen.x11("mouseup", 1)
+
+
+WAYS: dict[str, Way] = {
+    "stick released": Way(drag, lambda screen: screen.x11("mouseup", 1)),
+    "key released": Way(press, lambda screen: screen.x11("keyup", "w")),
+    "touch cancelled": Way(touch, _asks("touch('cancel', 100, 40)")),
+    "pointer grab lost": Way(drag, _asks("item('touch').ungrabMouse()")),
+    "dead-man released": Way(push, _asks("set('window', 'pushed', False)")),
+    "focus lost": Way(press, _asks("item('other').show(); item('other').requestActivate()")),
+    "window hidden": Way(drag, _asks("item('window').hide()")),
+    "window minimised": Way(drag, _asks("item('window').showMinimized()")),
+    "tab changed": Way(press, _asks("set('page', 'visible', False)")),
+    "modal dialog": Way(drag, _asks("item('dialog').show(); item('dialog').requestActivate()")),
+    "modal popup": Way(press, _asks("item('popup').open()")),
+    "window closed": Way(drag, _asks("item('window').close()"), ends=True),
+    "interface reloaded": Way(press, _reload),
+    "error in QML": Way(push, _asks("set('window', 'wrong', True)")),
+    "screen frozen for 1 s": Way(drag, _asks("time.sleep(1)"), limit_s=0.2),
+    "another robot selected": Way(drag, _asks("set('command', 'ns', '/b')")),
+    "reconnected": Way(press, _asks("reconnect()")),
+    "input destroyed": Way(push, _asks("set('loader', 'active', False)")),
+    "suspended": Way(drag, _stop_and_continue),
+    "clock changed": Way(press, _asks("change_clock(3600)")),
+    "two inputs": Way(drag, _second_input),
+    # Its notice covers the stick.
+    "JavaScript interrupted": Way(press, _asks("set('window', 'work', 5)"), limit_s=0.2),
+    "SIGINT": Way(press, _sends(signal.SIGINT), ends=True),
+    "SIGTERM": Way(drag, _sends(signal.SIGTERM), ends=True),
+    "Qt.quit()": Way(press, _asks("quit()"), ends=True),
+}
+
+
+class Outcome(NamedTuple):
+    """How it was let go.
+
+    Attributes:
+        late_s: Seconds from the event to the last motion that the robot received; negative if that
+            was before.
+        zeros: Zeros that followed.
+        moved_after: Motions that the robot received after the first zero.
+    """
+
+    late_s: float
+    zeros: int
+    moved_after: int
+
+
+def let_go(screen: Screen, robot: Robot, way: Way) -> Outcome:
+    """Steer the robot, let go in some way, and wait until nothing is sent any more."""
+
+    def moves() -> bool:
+        """Hold it for 0.2 s; on a busy machine the screen may stand still."""
+        screen.reset()
+        way.hold(screen)
+        nothing_happens(0.2)
+        if not robot.moves:
+            screen.ask("print(item('command').problem, item('stick').property('held'))")
+        return robot.moves
+
+    eventually(moves, lambda: screen.text)
+    before = len(robot.received)
+    began = way.let_go(screen)
+    eventually(lambda: robot.zeros >= 3, lambda: (screen.text, robot.received[before:]))
+    eventually(lambda: time.monotonic() - robot.received[-1][0] > _SILENCE_S)
+    later = robot.received[before:]
+    first = next(at for at, (_, speed) in enumerate(later) if not speed)
+    moved = sum(speed > 0 for _, speed in later[first:])
+    return Outcome(robot.last_motion() - began, robot.zeros, moved)
+
+
+# -- the program ---------------------------------------------------------------------------------
+
+
+def main(file: str, url: str) -> int:
+    """Show the screen, and run the lines of the standard input on the GUI thread."""
+    from rosglass.controls import command_sender
+    from rosglass.qml import Application
+    from rosglass.qt import QtCore, QtGui
+
+    app = Application(file, url=url, watch=True)
+    app.session.longest_script = 1.0
+
+    def note_reload() -> None:
+        print(f"RELOADING {time.monotonic()}", flush=True)
+
+    app._runner._live.due.connect(note_reload)
+    app.load()
+    app.window.requestActivate()
+
+    def item(name: str) -> Any:
+        window: Any = app.window
+        return window if name == "window" else window.findChild(QtCore.QObject, name)
+
+    def set_property(name: str, key: str, value: Any) -> None:
+        item(name).setProperty(key, value)
+
+    def reconnect() -> None:
+        app.session.url = app.session.url.replace("127.0.0.1", "localhost", 1)
+
+    class Clock:
+        """The module `time`, with the system's clock changed."""
+
+        def __init__(self, step: float) -> None:
+            self._step = step
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(time, name)
+
+        def time(self) -> float:
+            return time.time() + self._step
+
+    def change_clock(step: float) -> None:
+        command_sender.time = Clock(step)  # type: ignore[assignment]
+
+    fingers: list[Any] = []
+
+    def touch(what: str, x: int, y: int) -> None:
+        from PySide6.QtTest import QTest
+
+        device = fingers[0] if fingers else QTest.createTouchDevice()
+        fingers[:] = [device]
+        window: Any = app.window
+        if what == "cancel":
+            event = QtGui.QTouchEvent(QtCore.QEvent.Type.TouchCancel, device)
+            QtCore.QCoreApplication.sendEvent(window, event)
+            return
+        sequence = QTest.touchEvent(window, device)
+        (sequence.press if what == "press" else sequence.move)(1, QtCore.QPoint(x, y), window)
+        sequence.commit()
+
+    def reset() -> None:
+        for name, properties in {
+            "window": {"pushed": False, "wrong": False, "work": 0, "visible": True},
+            "page": {"visible": True},
+            "popup": {"visible": False},
+            "other": {"visible": False},
+            "dialog": {"visible": False},
+            "loader": {"active": True},
+            "command": {"ns": ""},
+        }.items():
+            for key, value in properties.items():
+                set_property(name, key, value)
+        command_sender.time = time
+        item("window").showNormal()
+        item("window").requestActivate()
+        timer.start(20)
+
+    names = {
+        "reset": reset,
+        "item": item,
+        "set": set_property,
+        "touch": touch,
+        "reconnect": reconnect,
+        "change_clock": change_clock,
+        "quit": app.engine.quit.emit,
+        "time": time,
+        "print": print,
+    }
+
+    def run(line: str) -> None:
+        print(f"BEGIN {time.monotonic()}", flush=True)
+        exec(line, names)
+        print("DONE", flush=True)
+
+    def read() -> None:
+        for line in sys.stdin:
+            app.session.executor.post(lambda line=line: run(line))
+
+    def on_ready() -> None:
+        sender, window = item("command")._endpoint, item("window")
+        if sender and sender.publisher.subscription_count() and window.isActive():
+            timer.stop()
+            print("READY", flush=True)
+
+    timer = QtCore.QTimer()
+    timer.timeout.connect(on_ready)
+    timer.start(20)
+    threading.Thread(target=read, daemon=True).start()
+    return app.run(end_process=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
