@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import os
 import subprocess
 import sys
 import tempfile
@@ -27,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests/helpers"))
 from ports import free_port
 
 import rosglass
-from letting_go import WAYS, Outcome, Robot, Screen, let_go, stays_connected
+from letting_go import WAYS, Outcome, Robot, Screen, busy_cores, let_go, stays_connected
 from rosglass.demo.processes import VirtualScreen
 from rosglass.wires.zenoh.router import Router
 
@@ -54,19 +53,6 @@ def master() -> Iterator[str]:
         finally:
             made.kill()
             made.wait()
-
-
-@contextlib.contextmanager
-def load(busy: bool) -> Iterator[None]:
-    """Keep all cores busy."""
-    count = (os.cpu_count() or 1) if busy else 0
-    made = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
-    try:
-        yield
-    finally:
-        for process in made:
-            process.kill()
-            process.wait()
 
 
 def measure(names: list[str], times: int, url: str, display: str) -> dict[str, list[Outcome]]:
@@ -116,7 +102,7 @@ def main() -> int:
         print(f"{given.times} times each, over {url.partition(':')[0]}; ms after the event\n")
         print("| way | median | worst | limit | least zeros | motions after | |")
         print("|---|---|---|---|---|---|---|")
-        with stays_connected(screen.display), load(given.busy):
+        with stays_connected(screen.display), busy_cores(given.busy):
             found = measure(given.only, given.times, url, screen.display)
     return int(any(is_missed(name, outcomes) for name, outcomes in found.items()))
 

@@ -102,6 +102,19 @@ def stays_connected(display: str) -> Iterator[None]:
         client.wait()
 
 
+@contextmanager
+def busy_cores(busy: bool = True) -> Iterator[None]:
+    """Keep all cores busy by other processes, if `busy`."""
+    count = (os.cpu_count() or 1) if busy else 0
+    made = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for process in made:
+            process.kill()
+            process.wait()
+
+
 class Robot:
     """Keeps what arrives at a robot: the time, by the system's steady clock, and the speed."""
 
