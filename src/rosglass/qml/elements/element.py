@@ -431,9 +431,8 @@ class TopicElement(Element):
             return  # the topic is the same, but no longer depends on the node's namespace
         self._resolved = ""
         # A paused image would stay on the screen under the new topic's name.
-        self._clear_shown()
+        self._begin_again()
         self.topicChanged.emit()  # type: ignore[attr-defined]
-        self._schedule()
 
     def _set_resolved(self, topic: str) -> None:
         if topic != self._resolved:
@@ -447,9 +446,17 @@ class TopicElement(Element):
         if namespace != self._namespace:
             self._namespace, self._resolved = namespace, ""
             self._shown_namespace = self._get_namespace()
-            self._clear_shown()
+            self._begin_again()
             self.nsChanged.emit()  # type: ignore[attr-defined]
-            self._schedule()
+
+    def _begin_again(self) -> None:
+        """Subscribe again, even if the new name is resolved to the same topic.
+
+        The data shown is cleared, and a latched message is received only once.
+        """
+        self._close_endpoint()
+        self._clear_shown()
+        self._schedule()
 
     def _clear_shown(self) -> None:
         """Clear the data shown, which belongs to another topic."""

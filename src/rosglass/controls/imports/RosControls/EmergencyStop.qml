@@ -38,7 +38,7 @@ Item {
     property var wanted: null
     // Whether the robot's state is known; and what it is.
     readonly property bool known: service && !stateTopic ? confirmed_ !== null && serving_ && connected_ : !state_.stale
-    readonly property bool stopped: known && (stateTopic ? state_.message.data === true : confirmed_)
+    readonly property bool stopped: known && (stateTopic ? !!state_.message && state_.message.data === true : confirmed_)
     readonly property bool pending: wanted !== null && (!known || stopped !== wanted)
     // A command has not been confirmed for half a second.
     property bool overdue: false

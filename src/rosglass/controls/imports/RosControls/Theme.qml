@@ -81,7 +81,8 @@ QtObject {
             console.error("Theme.mode is one of " + modes.join(", ") + "; got \"" + mode + "\"")
     }
     onScaleChanged: {
-        if (size !== scale)
+        // Not by `size`, which may not have changed yet.
+        if (!(scale >= 0.5 && scale <= 8))
             console.error("Theme.scale is from 0.5 to 8; got " + scale)
     }
 }
