@@ -80,6 +80,40 @@ def test_all_examples_and_names_exclude_each_other(capsys: pytest.CaptureFixture
     assert "leave out the names" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("template", ["cockpit", "teleop", "fleet", "kiosk"])
+def test_new_writes_a_template(
+    template: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["new", "mine.qml", "--template", template]) == 0
+    text = (folder / "mine.qml").read_text()
+    assert "import RosControls 1.0" in text
+    assert "rosglass run mine.qml --watch" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("file", "reason"),
+    [
+        ("there.qml", "exists already, and is left as it is"),
+        ("mine.txt", "ends in .qml"),
+        ("mine", "ends in .qml"),
+        ("no/such/mine.qml", "there is no folder no/such"),
+    ],
+)
+def test_new_refuses(
+    file: str, reason: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "there.qml").write_text("mine")
+    assert main(["new", file]) == 1
+    assert reason in capsys.readouterr().err
+    assert {one.name: one.read_text() for one in folder.iterdir()} == {"there.qml": "mine"}
+
+
+def test_new_names_the_templates(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["new", "mine.qml", "--template", "tank"])
+    assert "cockpit" in capsys.readouterr().err
+
+
 def test_names_are_completed() -> None:
     from argparse import Namespace
 

@@ -27,7 +27,7 @@ from rosglass.cli.parser import (
 if TYPE_CHECKING:
     import argparse
 
-__all__ = ["COMMANDS", "PLAY_KEYS"]
+__all__ = ["COMMANDS", "PLAY_KEYS", "TEMPLATES"]
 
 #: The keys of ``rosglass play``.
 PLAY_KEYS = (
@@ -934,6 +934,26 @@ def _router(parser: argparse.ArgumentParser) -> None:
     parser.epilog = "docs/security.md in the source has a configuration with users and TLS."
 
 
+#: Template of ``rosglass new`` -> its description.
+TEMPLATES = {
+    "cockpit": "camera, map, driving, stop, plot and states of one robot",
+    "teleop": "camera, stick, keys and stop",
+    "fleet": "several robots, one of which is driven",
+    "kiosk": "states on a screen that visitors touch",
+}
+
+
+def _new(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE.qml", help="the new file; an existing one is kept")
+    parser.add_argument(
+        "--template",
+        choices=tuple(TEMPLATES),
+        default="cockpit",
+        help="; ".join(f"{name}: {what}" for name, what in TEMPLATES.items())
+        + " (default: %(default)s)",
+    )
+
+
 def _examples(parser: argparse.ArgumentParser) -> None:
     _add_name(
         parser,
@@ -979,6 +999,7 @@ COMMANDS = {
     "bridge": (_bridge, "relay topics, services and actions between two graphs"),
     "doctor": (_doctor, "find what blocks the connection to the robot"),
     "router": (_router, "run a Zenoh router for ROS 2 (rmw_zenoh)"),
+    "new": (_new, "write an interface to start from"),
     "examples": (_examples, "list the examples, or copy one to start from"),
     "completion": (_completion, "print the shell code for Tab completion"),
 }

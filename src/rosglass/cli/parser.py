@@ -48,6 +48,7 @@ EXAMPLES = {
     "lifecycle list": ("/camera", "/camera --all"),
     "lifecycle nodes": ("",),
     "lifecycle set": ("/camera configure", "/camera activate --timeout 60"),
+    "new": ("cockpit.qml", "drive.qml --template teleop"),
     "node cleanup": ("--url ros1://robot:11311",),
     "node info": ("/camera",),
     "node kill": ("/camera /lidar",),
