@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rosglass.controls.diagnostics import DiagnosticsTopic
 from rosglass.controls.gamepad import Gamepad
@@ -24,7 +24,10 @@ from rosglass.controls.topic_recorder import TopicRecorder
 from rosglass.controls.topic_rows import TopicRows
 from rosglass.controls.twist_command import TwistCommand
 from rosglass.controls.window_keys import WindowKeys
-from rosglass.qt import QtCore, QtQml
+from rosglass.qml.run.modules import register_class
+
+if TYPE_CHECKING:
+    from rosglass.qt import QtCore
 
 __all__ = ["TYPES", "register"]
 
@@ -57,7 +60,5 @@ TYPES: dict[str, type[QtCore.QObject]] = {
 @cache
 def register() -> None:
     """Register the types with Qt; only the first call has an effect."""
-    # PySide takes texts for names, which its hints do not say.
-    register_type: Any = QtQml.qmlRegisterType
     for name, kind in TYPES.items():
-        register_type(kind, "RosControls", 1, 0, name)
+        register_class(kind, "RosControls", name)

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rosglass.comm.names import similar
-from rosglass.errors import Error, QmlError
+from rosglass.errors import Error, QmlError, UnsupportedError
 from rosglass.qml.engine.runtime import Runtime, runtime_of
-from rosglass.qt import QT6, QtCore, QtQml, address
+from rosglass.qt import QT6, QtCore, QtQml, QtQuick, address
 
 if TYPE_CHECKING:
     from rosglass.qml.engine.session import Session
@@ -30,6 +30,7 @@ __all__ = [
     "locate",
     "near",
     "register",
+    "register_class",
     "show_plain_labels",
 ]
 
@@ -181,8 +182,9 @@ _REPLACED = (
         ),
     ]
 )
-#: QQmlPrivate::qmlregister(), mangled by the Itanium C++ ABI, and its argument for a QML file.
-_REGISTER, _COMPOSITE = "_ZN11QQmlPrivate11qmlregisterENS_16RegistrationTypeEPv", 4
+#: QQmlPrivate::qmlregister(), mangled by the Itanium C++ ABI, and its arguments for a class and for
+#: a QML file.
+_REGISTER, _CLASS, _COMPOSITE = "_ZN11QQmlPrivate11qmlregisterENS_16RegistrationTypeEPv", 0, 4
 
 
 class _CompositeType(ctypes.Structure):
@@ -195,6 +197,108 @@ class _CompositeType(ctypes.Structure):
         ("minor", ctypes.c_int),
         ("name", ctypes.c_char_p),
     ]
+
+
+class _ClassType(ctypes.Structure):
+    """QQmlPrivate::RegisterType of Qt 5."""
+
+    _fields_: ClassVar = [
+        ("version", ctypes.c_int),
+        ("type_id", ctypes.c_int),
+        ("list_id", ctypes.c_int),
+        ("size", ctypes.c_int),
+        ("create", ctypes.c_void_p),
+        ("no_creation_reason", ctypes.c_void_p),
+        ("uri", ctypes.c_char_p),
+        ("major", ctypes.c_int),
+        ("minor", ctypes.c_int),
+        ("name", ctypes.c_char_p),
+        ("meta_object", ctypes.c_void_p),
+        ("attached", ctypes.c_void_p),
+        ("attached_meta_object", ctypes.c_void_p),
+        ("parser_status", ctypes.c_int),
+        ("value_source", ctypes.c_int),
+        ("value_interceptor", ctypes.c_int),
+        ("extension", ctypes.c_void_p),
+        ("extension_meta_object", ctypes.c_void_p),
+        ("custom_parser", ctypes.c_void_p),
+        ("revision", ctypes.c_int),
+    ]
+
+
+#: Classes that PySide2 registers for us. It takes 50 at most, and no item beyond these, although it
+#: does not count items.
+_MOST_PYSIDE2 = 40
+#: The classes that were registered, without items. Qt keeps addresses of those of ours.
+_registered: list[Any] = []
+
+
+def register_class(kind: type[QtCore.QObject], uri: str, name: str) -> None:
+    """Register a class as version 1.0 of a QML type."""
+    # PySide takes texts for names, which its hints do not say.
+    register_type: Any = QtQml.qmlRegisterType
+    if not QT6 and not issubclass(kind, QtQuick.QQuickItem) and len(_registered) >= _MOST_PYSIDE2:
+        _register_further(kind, uri.encode(), name.encode())
+    else:
+        register_type(kind, uri, 1, 0, name)
+        if not QT6:
+            _registered.append(kind)
+            _restore_lists()
+
+
+def _register_further(kind: type[QtCore.QObject], uri: bytes, name: bytes) -> None:
+    """Register a class with Qt 5 in the way in which PySide2 does it."""
+    # Also finds the symbols of libpyside2, on which it depends.
+    pyside: Any = ctypes.PyDLL(QtCore.__file__)
+    next_address = pyside["_ZN6PySide24setNextQObjectMemoryAddrEPv"]
+    next_address.argtypes, next_address.restype = [ctypes.c_void_p], None
+    size = pyside["_ZN6PySide16getSizeOfQObjectEP13SbkObjectType"]
+    size.argtypes = [ctypes.py_object]
+    meta_object = pyside["_ZN6PySide18retrieveMetaObjectEP11_typeobject"]
+    meta_object.argtypes, meta_object.restype = [ctypes.py_object], ctypes.c_void_p
+
+    def make(memory: int) -> None:
+        next_address(memory)
+        try:
+            # Never freed, like all objects of PySide2 that QML creates.
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(kind()))
+        finally:
+            next_address(None)
+
+    create = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(make)
+    _registered.append((create, uri, name, kind))
+    function = ctypes.cast(create, ctypes.c_void_p)
+    _register_object(meta_object(kind), size(kind), function, uri, name)
+    _restore_lists()
+
+
+def _restore_lists() -> None:
+    """Let lists of objects take all of them again.
+
+    PySide2 registers each class as if it were QObject, so that lists, such as the children of an
+    item, take objects of the last one only; Qt Quick does the same as this when it is loaded.
+    """
+    plain: Any = QtCore.QObject
+    _register_object(address(plain.staticMetaObject), 0, None, None, None)
+
+
+def _register_object(
+    meta_object: int, size: int, create: Any, uri: bytes | None, name: bytes | None
+) -> None:
+    """Call Qt's function for types with the metatype of QObject."""
+    core = ctypes.CDLL("libQt5Core.so.5")
+    type_id = core["_ZN9QMetaType4typeEPKc"]
+    type_id.argtypes = [ctypes.c_char_p]
+    no_reason = ctypes.addressof(ctypes.c_char.in_dll(core, "_ZN10QArrayData11shared_nullE"))
+    ids = type_id(b"QObject*"), type_id(b"QQmlListProperty<QObject>")
+    made = _ClassType(
+        0, *ids, size, create, no_reason, uri, int(bool(uri)), 0, name, meta_object, None, None,
+        -1, -1, -1,
+    )  # fmt: skip
+    call = ctypes.CDLL(_LIBRARY)[_REGISTER]
+    call.argtypes = [ctypes.c_int, ctypes.c_void_p]
+    if call(_CLASS, ctypes.byref(made)) < 0:
+        raise UnsupportedError(f"Qt refuses the type {name!r} of the module {uri!r}")
 
 
 @cache
@@ -261,12 +365,11 @@ def register() -> None:
     # Half of all that an interface loads, and rosglass view needs none of it.
     from rosglass.qml.elements import ros1, ros2  # noqa: PLC0415
 
-    register_type: Any = QtQml.qmlRegisterType
     for uri, module in (("Ros", ros1), ("Ros2", ros2)):
         for name, native in module.NATIVE.items():
-            register_type(native, f"{uri}.Native", 1, 0, name)
+            register_class(native, f"{uri}.Native", name)
         for name, kind in module.TYPES.items():
-            register_type(kind, uri, 1, 0, name)
+            register_class(kind, uri, name)
 
 
 def install(
