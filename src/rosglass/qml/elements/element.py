@@ -530,6 +530,8 @@ class TopicElement(Element):
 CONNECTION_TIMEOUT_MS = 10_000
 #: Milliseconds to find a server before its absence is logged as a warning.
 _SEARCH_MS = 2000
+#: Ticks (a tenth of a second) between two looks at why there is no server.
+_PROBLEM_TICKS = 10
 
 
 class ClientElement(Element):
@@ -546,6 +548,7 @@ class ClientElement(Element):
         super().__init__(None, runtime)
         self._name, self._type, self._dialect = name, type_name, dialect
         self._watch: Handle | None = None
+        self._ticks = 0
 
     @property
     def label(self) -> str:
@@ -615,6 +618,14 @@ class ClientElement(Element):
             QtCore.QTimer.singleShot(_SEARCH_MS, lambda: self._warn(client))
             return
         self._log(self._problem, logging.WARNING)
+
+    @Slot()
+    def _on_tick(self) -> None:
+        self._ticks += 1
+        client = self._endpoint
+        # Why there is no server changes without a signal, e.g. when its type cannot be fetched.
+        if client is not None and self._ticks % _PROBLEM_TICKS == 0 and not client.ready:
+            self._set_problem(client.problem, logging.DEBUG)
 
     def _on_ready(self, ready: bool) -> None:
         if not is_alive(self) or self._endpoint is None:
