@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import threading
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from counting import Counter
 from hands import click, write
+
+import rosglass
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 pytestmark = pytest.mark.both_qt
 TYPE = "example_interfaces/action/Fibonacci"
@@ -110,3 +115,47 @@ def test_goal_over_a_real_middleware(live_controls: Any, url: str, wait: Any) ->
     wait(lambda: panel.property("outcome") == "running")
     panel.cancel()
     wait(lambda: panel.property("outcome") == "canceled")
+
+
+@pytest.mark.parametrize("url", ["zenoh"], indirect=True, scope="module")
+def test_types_that_only_the_robot_has(
+    live_controls: Any, url: str, wait: Any, tmp_path: Path
+) -> None:
+    """The form of an action, and a service's request, of types that are fetched from the robot."""
+    for kind, text in (
+        (
+            "action/Dig",
+            "float64 depth\nstring tool\nbool fast\n---\nfloat64 dug\n---\nfloat64 progress\n",
+        ),
+        ("srv/Fill", "int32 count\n---\nbool ok\nstring reason\n"),
+    ):
+        file = tmp_path / "moon_msgs" / f"{kind}.{kind.partition('/')[0]}"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+    library = rosglass.Library()
+    library.add_path(tmp_path / "moon_msgs")
+    got: list[Any] = []
+
+    def dig(goal: Any) -> dict[str, float]:
+        got.append((goal.goal.depth, goal.goal.tool, goal.goal.fast))
+        goal.publish_feedback({"progress": 0.5})
+        return {"dug": goal.goal.depth}
+
+    with rosglass.connect(url, "digger", library=library) as robot:
+        robot.create_action_server("/dig", "moon_msgs/action/Dig", dig)
+        robot.create_service_server(
+            "/fill", "moon_msgs/srv/Fill", lambda _: {"ok": False, "reason": "no sand"}
+        )
+        live_controls.show("""Column {
+            ActionPanel { objectName: "dig"; action: "/dig"; width: 300 }
+            ServiceButton { objectName: "fill"; service: "/fill"; request: ({count: 3}) }
+        }""")
+        panel, button = live_controls.find("dig"), live_controls.find("fill")
+        wait(lambda: panel.property("formType_") and button.property("ready"))
+        write(live_controls, "field_tool", "<b>spade</b>")
+        wait(lambda: panel.property("outcome") == "succeeded")
+        write(live_controls, "field_depth", "1.5")
+        wait(lambda: (1.5, "<b>spade</b>", False) in got)
+        wait(lambda: live_controls.find("said").property("text") == "dug 1.5")
+        button.call()
+        wait(lambda: button.property("status") == "REFUSED: no sand")

@@ -259,9 +259,12 @@ LiveFrame {
     onForm_Changed: fillForm_()
     Component.onCompleted: if (!client_) connect_()
 
-    Connections {
-        target: panel.form_ && panel.formType_ === "" ? Ros2 : null
-        function onGraphChanged() { panel.fillForm_() }
+    // The type may still be on its way from the robot.
+    Timer {
+        interval: 1000
+        repeat: true
+        running: panel.form_ && panel.formType_ === "" && panel.ready
+        onTriggered: panel.fillForm_()
     }
     Connections {
         target: panel.handle_
