@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -67,7 +68,15 @@ def partner(request: Any, world: str) -> Iterator[None]:
 
 
 #: Examples that are drawn in both versions of Qt; every one is loaded in both.
-DRAWN_IN_BOTH = {"camera", "figure4", "figure5", "image_publisher", "message_tree", "panel"}
+DRAWN_IN_BOTH = {
+    "camera",
+    "figure4",
+    "figure5",
+    "image_publisher",
+    "message_tree",
+    "operator_screen",
+    "panel",
+}
 
 
 @pytest.fixture(
@@ -90,8 +99,10 @@ def file(request: Any) -> Path:
 @pytest.mark.usefixtures("messages")
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_it_loads(path: Path, running: Bench, caplog: pytest.LogCaptureFixture) -> None:
+    from rosglass.controls import register
     from rosglass.qt import QtCore, QtQml
 
+    register()
     component = QtQml.QQmlComponent(running.engine, QtCore.QUrl.fromLocalFile(str(path)))
     root = component.create()
     assert root is not None, component.errorString()
@@ -315,8 +326,6 @@ def test_no_button_of_an_example_is_forgotten() -> None:
     """Those that a robot's request enables are clicked by the tests of servers."""
     asked = {"action_server", "servers", "service_server", "replay"}
     with_buttons = {
-        file.stem
-        for file in FILES
-        if any(word in file.read_text() for word in ("Button {", "Switch {", "CheckBox {"))
+        file.stem for file in FILES if re.search(r"\b(Button|Switch|CheckBox) {", file.read_text())
     }
     assert with_buttons == {*BUTTONS, *asked}
