@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
+import gc
 import threading
+import weakref
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 
@@ -650,6 +652,19 @@ def test_closing_ends_waiting_for_the_server(client):
     threading.Timer(0.05, client.close).start()
     with pytest.raises(rosglass.NodeClosedError, match="is closed"):
         client.wait_for_server()
+
+
+def test_ended_call_is_freed_without_the_garbage_collector(client, offer, eventually):
+    offer()
+    gc.disable()
+    try:
+        call = client.call_async({"a": 1})
+        assert call.result(30).sum == 1
+        ended = weakref.ref(call)
+        del call
+        eventually(lambda: ended() is None)
+    finally:
+        gc.enable()
 
 
 def test_cancelled_call_ends_at_once(client, offer):

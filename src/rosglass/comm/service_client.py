@@ -30,6 +30,7 @@ from rosglass.errors import (
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from concurrent.futures import Future
 
     from rosglass.comm.core import NodeCore
     from rosglass.comm.qos import QoS
@@ -56,7 +57,7 @@ class PendingCalls:
         #: Guards the calls and their flags `waiting`.
         self._lock = threading.Lock()
         # Not a dict, whose first item is searched for behind all those that were removed.
-        self._calls: OrderedDict[Call, PendingCall] = OrderedDict()
+        self._calls: OrderedDict[Future[Message], PendingCall] = OrderedDict()
         self.waiting = 0
 
     def __len__(self) -> int:
@@ -82,12 +83,14 @@ class PendingCalls:
                 pending.waiting = True
                 self.waiting += 1
 
-    def remove(self, pending: PendingCall) -> None:
-        """Remove a call that has ended."""
+    def remove(self, call: Future[Message]) -> PendingCall | None:
+        """Remove and return a call that has ended; None if it was removed before."""
         with self._lock:
-            self._calls.pop(pending.call, None)
-            self.waiting -= pending.waiting
-            pending.waiting = False
+            pending = self._calls.pop(call, None)
+            if pending is not None and pending.waiting:
+                self.waiting -= 1
+                pending.waiting = False
+        return pending
 
     def first(self) -> PendingCall | None:
         """Return the first request that waits; None if there is none."""
@@ -369,9 +372,10 @@ class ServiceClient(Client):
             pending.timer = self._core.timers.after(timeout, lambda: self._expire(pending))
         self._calls.add(pending)
         if self._closed:  # by another thread, which may have missed this call
-            self._on_end(pending)
+            self._on_end(call)
             self._check_open()
-        call.add_done_callback(lambda _: self._on_end(pending))
+        # Not a function with the pending call, which would leave a cycle to the garbage collector.
+        call.add_done_callback(self._on_end)
         return pending
 
     def _withdraw(self, call: Call) -> bool:
@@ -381,11 +385,13 @@ class ServiceClient(Client):
 
     # -- the end of a call -----------------------------------------------------------------------
 
-    def _on_end(self, pending: PendingCall) -> None:
+    def _on_end(self, call: Future[Message]) -> None:
         """Clean up after a call, on any thread."""
+        pending = self._calls.remove(call)
+        if pending is None:
+            return
         if pending.timer is not None:
             pending.timer.close()
-        self._calls.remove(pending)
         self._requester.forget(pending)
 
     def _expire(self, pending: PendingCall) -> None:
