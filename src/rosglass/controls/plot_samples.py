@@ -1,7 +1,7 @@
 """The samples of one plotted line, and their extremes in each column of pixels.
 
 Samples are kept in blocks, so that old ones are dropped without moving the others. Each block has
-the least and greatest value of every 16, 256 and 4096 samples, so that a view of hours costs what
+the least and greatest value of every 16, 64, 256 ... samples, so that a view of hours costs what
 its columns cost: a spike of one sample is seen at any zoom.
 """
 
@@ -25,13 +25,12 @@ __all__ = ["BLOCK_SIZE", "MAX_RUNS", "Columns", "Samples"]
 
 #: Samples in a full block, and in a new one, which doubles until it is full.
 BLOCK_SIZE, _FIRST_SIZE = 65_536, 256
-#: Samples in a chunk of each level, the smallest first; each level has 16 chunks of the one below.
-_FANOUT = 16
-_LEVELS = (16, 256, 4096)
+#: Samples in a chunk of each level, the smallest first.
+_LEVELS = (16, 64, 256, 1024, 4096)
 _GROUP = _LEVELS[-1]
 #: A level serves if a column has this many of its chunks: they are assigned to a column as a whole,
-#: which moves none by more than a quarter of a column.
-_MIN_CHUNKS = 4
+#: which moves none by more than half a column.
+_MIN_CHUNKS = 2
 #: Nanoseconds by which a time may be before the newest one to be a late sample; beyond, time itself
 #: has gone back (a simulation was reset, a recording began again).
 _MAX_LATE_NS = 2_000_000_000
@@ -91,8 +90,9 @@ class _Block:
         start = self.covered
         low = high = self.values[start : start + _GROUP]
         for size, (lows, highs) in zip(_LEVELS, self.levels, strict=True):
-            low = np.fmin.reduce(low.reshape(-1, _FANOUT), axis=1)
-            high = np.fmax.reduce(high.reshape(-1, _FANOUT), axis=1)
+            shape = _GROUP // size, -1
+            low = np.fmin.reduce(low.reshape(shape), axis=1)
+            high = np.fmax.reduce(high.reshape(shape), axis=1)
             place = start // size
             lows[place : place + len(low)], highs[place : place + len(low)] = low, high
         self.covered = start + _GROUP
@@ -192,7 +192,7 @@ class _Run:
         return dropped
 
     def reduce(self, low: Values, high: Values, start: int, step: int) -> None:
-        """Widen the extremes of columns by the samples in them.
+        """Set the extremes of the columns that have samples.
 
         Args:
             low: Least values of the columns.
@@ -200,12 +200,16 @@ class _Run:
             start: Time of the first column.
             step: Length of a column in nanoseconds.
         """
-        end = start + len(low) * step
-        for block, first, stop in self._ranges(start, end):
+        parts: list[tuple[Times, Values, Values]] = []
+        for block, first, stop in self._ranges(start, start + len(low) * step):
             span = max(1, int(block.times[stop - 1]) - int(block.times[first]))
             per_column = (stop - first) * step / span
-            for times, lows, highs in block.parts(first, stop, per_column / _MIN_CHUNKS):
-                _reduce(times, lows, highs, low, high, start, step)
+            parts += block.parts(first, stop, per_column / _MIN_CHUNKS)
+        if len(parts) == 1:
+            _reduce(*parts[0], low, high, start, step)
+        elif parts:
+            times, lows, highs = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+            _reduce(times, lows, highs, low, high, start, step)
 
     def _ranges(self, start: int, end: int) -> Iterator[tuple[_Block, int, int]]:
         for block in self.blocks:
@@ -242,12 +246,10 @@ def _reduce(
     start: int,
     step: int,
 ) -> None:
-    """Widen the extremes of columns by ascending samples, all of which are within the columns."""
+    """Set the extremes of columns by ascending samples, all of which are within the columns."""
     first, last = (int(times[0]) - start) // step, (int(times[-1]) - start) // step
     if first == last:
-        at = slice(first, first + 1)
-        low[at] = _least(low[at], np.fmin.reduce(lows, keepdims=True))
-        high[at] = _greatest(high[at], np.fmax.reduce(highs, keepdims=True))
+        low[first], high[first] = np.fmin.reduce(lows), np.fmax.reduce(highs)
         return
     if len(times) < last - first:
         column = (times - start) // step
@@ -260,21 +262,8 @@ def _reduce(
         begins[0] = 0
         filled = np.flatnonzero(np.diff(begins, append=len(times)))
         columns, begins = first + filled, begins[filled]
-    # An empty column is +inf to -inf, which every value widens; NaN alone stays NaN.
-    low[columns] = _least(low[columns], np.fmin.reduceat(lows, begins))
-    high[columns] = _greatest(high[columns], np.fmax.reduceat(highs, begins))
-
-
-def _least(before: Values, new: Values) -> Values:
-    widened: Values = np.fmin(before, new)
-    only_nan = np.isnan(new) & (before == np.inf)
-    if only_nan.any():
-        widened[only_nan] = np.nan
-    return widened
-
-
-def _greatest(before: Values, new: Values) -> Values:
-    return -_least(-before, -new)
+    low[columns] = np.fmin.reduceat(lows, begins)
+    high[columns] = np.fmax.reduceat(highs, begins)
 
 
 class Samples:

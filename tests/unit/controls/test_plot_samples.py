@@ -45,8 +45,8 @@ def test_extremes_are_those_of_the_samples_in_each_column(step: int) -> None:
     samples, times, values = filled(200_000)
     start, count = 12_345 * MS, 400
     low, high = extremes(samples, start, step, count)
-    # Chunks are assigned as a whole: a quarter of a column more or less.
-    slack = step // 4
+    # Chunks are assigned as a whole: half a column more or less.
+    slack = step // 2
     for column in range(count):
         begin, end = start + column * step, start + (column + 1) * step
         wide = values[(times >= begin - slack) & (times < end + slack)]
