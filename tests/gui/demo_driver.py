@@ -44,7 +44,7 @@ class CockpitProcess:
         self._ask("ready")
 
     def get(self, item: str, name: str) -> Any:
-        """Return a property of a part of the cockpit."""
+        """Return a property of a part of the cockpit, such as ``scene.robotX`` of the map."""
         return self._ask("get", item, name)
 
     def call(self, item: str, method: str, *arguments: float) -> None:
@@ -151,7 +151,9 @@ class _Driver:
         return True
 
     def get(self, item: str, name: str) -> Any:
-        value = self.cockpit.item(item).property(name)
+        value = self.cockpit.item(item)
+        for part in name.split("."):
+            value = value.property(part)
         if hasattr(value, "toVariant"):
             value = value.toVariant()
         if isinstance(value, (self._core.QRectF, self._core.QRect)):
@@ -159,7 +161,9 @@ class _Driver:
         return value
 
     def call(self, item: str, method: str, *arguments: float) -> None:
-        self.cockpit.call(item, method, *arguments)
+        wrapped = [self._core.Q_ARG("QVariant", argument) for argument in arguments]
+        direct = self._core.Qt.ConnectionType.DirectConnection
+        self._core.QMetaObject.invokeMethod(self.cockpit.item(item), method, direct, *wrapped)
 
     def key(self, action: str, key: str) -> None:
         act = self._test.keyPress if action == "press" else self._test.keyRelease

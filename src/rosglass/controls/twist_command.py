@@ -112,9 +112,13 @@ class TwistCommand(Element):
     turnAcceleration = Writable(float, 4.0, within(0, 1000, "rad/s²"), then="_configure")
     #: Why driving is not allowed now; empty when it is.
     obstacle = Writable(str, "", then="_check")
+    #: Whether the robot answers: zeros are repeated until it has for a second.
+    reachable = Writable(bool, True, then="_on_connection")
     #: Whether an input steers now, and its name.
     active = ReadOnly(bool, False)
     holder = ReadOnly(str, "")
+    #: Why what is held does not steer; empty if it does, or nothing is held.
+    refusal = ReadOnly(str, "")
     #: The velocity sent now: m/s forward, m/s to the left, and rad/s to the left or a car's angle.
     speed = ReadOnly(float, 0.0)
     sideways = ReadOnly(float, 0.0)
@@ -126,8 +130,6 @@ class TwistCommand(Element):
         self._steers: _Input | None = None
         #: The type of the topic's subscribers.
         self._found = _TWIST
-        #: Why what is held does not move the robot.
-        self._blocked = ""
 
     # -- what inputs call ------------------------------------------------------------------------
 
@@ -158,11 +160,11 @@ class TwistCommand(Element):
             self._end(one, "it steers by what is not a number")
         elif not was_held:
             one.file = self._caller().file
-            one.off = self._refusal(one)
+            one.off = self._reason_against(one)
             if not one.off:
                 self._begin(one, wanted)
         elif not one.off:
-            reason = self._refusal(one) or self._endpoint.steer(*map(_unit, wanted))
+            reason = self._reason_against(one) or self._endpoint.steer(*map(_unit, wanted))
             if reason:
                 self._end(one, reason)
         self._show()
@@ -212,7 +214,7 @@ class TwistCommand(Element):
             one.shown.windowChanged.connect(self._check)
         return one
 
-    def _refusal(self, one: _Input) -> str:
+    def _reason_against(self, one: _Input) -> str:
         """Return why an input may not steer now; empty if it may."""
         if self.obstacle:
             return self.obstacle
@@ -263,7 +265,7 @@ class TwistCommand(Element):
         holder = self._steers
         if not is_alive(self) or holder is None:
             return
-        reason = self._refusal(holder)
+        reason = self._reason_against(holder)
         if reason:
             self._halt(reason)
 
@@ -294,21 +296,22 @@ class TwistCommand(Element):
         holder, sender = self._steers, self._endpoint
         now = sender.velocity if sender is not None else Velocity()
         off = next((one for one in self._inputs.values() if one.held and one.off), None)
-        self._blocked = f"{off.off}: let go first" if off is not None else ""
-        self._announce_problem()
         report(
             self,
+            refusal=f"{off.off}: let go first" if off is not None else "",
             active=holder is not None,
             holder=holder.name if holder is not None else "",
             speed=now.forward,
             sideways=now.sideways,
             turn=now.turn,
         )
+        if is_alive(self):
+            self._announce_problem()
 
     def _get_problem(self) -> str:
         sender = self._endpoint
         failed = sender.problem if sender is not None and self._steers is not None else ""
-        return self._blocked or failed or super()._get_problem()
+        return self._refusal or failed or super()._get_problem()
 
     @Slot()
     def _on_tick(self) -> None:
@@ -401,7 +404,7 @@ class TwistCommand(Element):
 
     def _on_created(self, endpoint: CommandSender) -> None:
         self._configure()
-        endpoint.connected = not self._disconnected()
+        endpoint.connected = self.reachable and not self._disconnected()
         with suppress(UnsupportedError):  # a recording, which has no subscribers
             endpoint.publisher.on_matched(weak_callback(self._on_matched), self._executor)
         self._set_problem("")
@@ -428,7 +431,7 @@ class TwistCommand(Element):
     def _on_connection(self) -> None:
         lost = self._disconnected()
         if self._endpoint is not None:
-            self._endpoint.connected = not lost
+            self._endpoint.connected = self.reachable and not lost
         if lost:
             self._halt(lost)
             self._show()

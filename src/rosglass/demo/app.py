@@ -1,4 +1,4 @@
-"""The cockpit as a program: window, held keys, node, and the figures it prints when it ends."""
+"""The cockpit as a program: window, node, and the figures it prints when it ends."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rosglass.demo import framecode, pictures
+from rosglass.demo import framecode
 from rosglass.demo.camera import CODE_POSITION
 from rosglass.errors import Error, QmlError
 from rosglass.qml import Session
@@ -22,12 +22,12 @@ from rosglass.qml.elements.subscription import Subscription
 from rosglass.qml.engine.log import install_message_handler
 from rosglass.qml.engine.process import QuitOnSignal, close_network, quiet_qt, require_display
 from rosglass.qml.run.runner import Runner
-from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, optional
+from rosglass.qt import QtCore, QtGui, QtQuick, optional
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-__all__ = ["AUTOPILOT", "Cockpit", "HeldKeys", "register"]
+__all__ = ["AUTOPILOT", "CameraFigures", "Cockpit", "Latency", "ProcessFigures", "table"]
 
 _QML = Path(__file__).with_name("cockpit") / "main.qml"
 #: Movements of the stick without an operator: start in seconds, right, down.
@@ -67,7 +67,6 @@ class Cockpit:
                 QtQuick.QQuickWindow.TextRenderType.NativeTextRendering
             )
         close_network()
-        register()
         self.session = Session(url)
         self._closed = False
         self._runner = Runner(_QML, self.session)
@@ -85,21 +84,27 @@ class Cockpit:
         self.process = ProcessFigures()
         self.camera = CameraFigures(self.item("picture").property("videoSink"), self.window)
 
-    def call(self, name: str, method: str, *arguments: float) -> None:
-        """Call a JavaScript function of a part of the interface."""
-        wrapped = [QtCore.Q_ARG("QVariant", argument) for argument in arguments]
-        QtCore.QMetaObject.invokeMethod(
-            self.item(name), method, QtCore.Qt.ConnectionType.DirectConnection, *wrapped
-        )
-
     def at(self, seconds: float, job: Callable[[], None]) -> None:
         """Run a job after some seconds."""
         QtCore.QTimer.singleShot(round(seconds * 1000), job)
 
     def fly(self, plan: Sequence[tuple[float, float, float]] = AUTOPILOT) -> None:
-        """Move the stick automatically, as an operator would."""
-        for begin, x, y in plan:
-            self.at(begin, lambda x=x, y=y: self.call("stick", "pull", x, y))  # type: ignore[misc]
+        """Move the stick automatically by the mouse, as an operator would."""
+        for number, (begin, x, y) in enumerate(plan):
+            self.at(begin, lambda n=number, x=x, y=y: self._pull(n == 0, x, y))  # type: ignore[misc]
+
+    def _pull(self, first: bool, x: float, y: float) -> None:
+        stick = self.item("stick")
+        middle, reach = stick.width() / 2, stick.width() * 0.31
+        if first:
+            self._press(stick.mapToScene(QtCore.QPointF(middle, middle)).toPoint())
+        point = stick.mapToScene(QtCore.QPointF(middle + x * reach, middle + y * reach))
+        _TEST.QTest.mouseMove(self.window, point.toPoint())
+
+    def _press(self, point: QtCore.QPoint) -> None:
+        button = QtCore.Qt.MouseButton.LeftButton
+        none = QtCore.Qt.KeyboardModifier.NoModifier
+        _TEST.QTest.mousePress(self.window, button, none, point)
 
     def screenshot(self, path: Path) -> None:
         """Save a screenshot of the window.
@@ -133,8 +138,8 @@ class Cockpit:
         return 128 + signals[0] if signals else 0
 
     def _let_go(self) -> None:
-        """Release the stick, and wait until its stop command was sent several times."""
-        self.call("stick", "letGo")
+        """Halt the robot, and wait until the zeros were sent."""
+        self.item("drive").halt()
         loop = QtCore.QEventLoop()
         QtCore.QTimer.singleShot(200, loop.quit)
         loop.exec()
@@ -151,9 +156,8 @@ class Cockpit:
         gc.collect()
 
     def topics(self) -> list[Any]:
-        """Return the interface's subscriptions and painted topics, one for each topic, by topic."""
-        kinds = (Subscription, pictures.MapPicture, pictures.ScanPicture)
-        found = {item.property("topic"): item for kind in kinds for item in self._all(kind)}
+        """Return the interface's subscriptions, one for each topic, by topic."""
+        found = {item.property("topic"): item for item in self.window.findChildren(Subscription)}
         return [found[topic] for topic in sorted(found)]
 
     def received(self, topic: str) -> bool:
@@ -211,80 +215,10 @@ class Cockpit:
             raise Error(f"the cockpit has no part called {name!r}")
         return found
 
-    def _all(self, kind: type) -> list[Any]:
-        return list(self.window.findChildren(kind))
-
-
-#: Milliseconds of a tick, and ticks from a release until it counts. Two, so that after a pause a
-#: press that waits in the queue is handled between them.
-_TICK, _TICKS = 16, 2
-
-
-class HeldKeys(QtCore.QObject):
-    """Distinguishes released keys from repeating ones.
-
-    On X11, a key held down repeats as releases and presses, and Qt marks those as repeats only if
-    both wait in its queue; on an idle window most do not. A press within 32 ms of the release of
-    the same key is therefore a repeat, and a release counts only if no such press follows.
-
-    Not a Timer of QML's, which ticks with the frames and would report a release late.
-    """
-
-    #: A key was released, 16 to 32 ms ago.
-    lifted = QtCore.Signal(int)
-
-    def __init__(self, parent: QtCore.QObject | None = None) -> None:
-        super().__init__(parent)
-        self._down: set[int] = set()
-        self._leaving: dict[int, int] = {}
-        self._timer = QtCore.QTimer(self)
-        self._timer.setTimerType(QtCore.Qt.TimerType.PreciseTimer)
-        self._timer.setInterval(_TICK)
-        self._timer.timeout.connect(self._tick)
-
-    @QtCore.Slot(int, result=bool)
-    def press(self, key: int) -> bool:
-        """Handle a key's press; return False if it is a repeat."""
-        repeats = self._leaving.pop(key, None) is not None or key in self._down
-        if not repeats:
-            self._down.add(key)
-        return not repeats
-
-    @QtCore.Slot(int)
-    def lift(self, key: int) -> None:
-        """Handle a key's release, even if another window received the press."""
-        self._leaving[key] = _TICKS
-        if not self._timer.isActive():
-            self._timer.start()
-
-    @QtCore.Slot()
-    def clear(self) -> None:
-        """Forget all keys without a signal: their release may go to another window."""
-        self._down.clear()
-
-    @QtCore.Slot()
-    def _tick(self) -> None:
-        gone = [key for key, ticks in self._leaving.items() if ticks == 1]
-        self._leaving = {key: ticks - 1 for key, ticks in self._leaving.items() if ticks > 1}
-        if not self._leaving:
-            self._timer.stop()
-        for key in gone:
-            if key in self._down:
-                self._down.remove(key)
-                self.lifted.emit(key)
-
-
-def register() -> None:
-    """Register the types of ``import RosglassDemo 1.0`` with Qt."""
-    pictures.register()
-    register_type: Any = QtQml.qmlRegisterType  # PySide6's annotation wants bytes for names
-    register_type(HeldKeys, "RosglassDemo", 1, 0, "HeldKeys")
-
 
 # Imported before QML creates a video sink: PySide supports only types of imported modules.
 _MULTIMEDIA: Any = optional("QtMultimedia")
-
-__all__ = ["CameraFigures", "Latency", "ProcessFigures", "table"]
+_TEST: Any = optional("QtTest")
 
 #: Number of images whose latency is kept, for five minutes: a cockpit may run for days.
 _NEWEST = 9000

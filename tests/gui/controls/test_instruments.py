@@ -280,13 +280,12 @@ def test_speed_names_what_is_not_a_number(shown: Any, controls: Any) -> None:
 
 def test_speed_says_why_the_robot_does_not_drive(shown: Any, controls: Any) -> None:
     item, publish = shown(
-        "Speed { command: QtObject { property string holder; property bool active; "
-        'property string problem; property string obstacle: "stop is pressed" } }',
+        "Speed { command: QtObject { property string refusal } }",
         ODOMETRY,
     )
     publish(**odometry())
     assert item.property("refusal") == ""
-    item.property("command").setProperty("holder", "stick")
+    item.property("command").setProperty("refusal", "stop is pressed")
     assert item.property("refusal") == "stop is pressed"
     assert controls.find("refusal").property("visible")
     assert not controls.find("readings").property("visible")

@@ -1,24 +1,12 @@
 // The operator's cockpit: everything on one screen, usable with mouse, fingers or keyboard.
 import QtQuick
 import Ros2 1.0
-import RosglassDemo 1.0
+import RosControls 1.0
 
 Item {
-    id: cockpit
-    objectName: "cockpit"
+    id: cockpit; objectName: "cockpit"
 
-    property alias drive: drive
-    property alias stick: stick
-    property alias stop: stop
-    property alias camera: camera
-    property alias map: map
-    property alias link: link
-    property alias battery: battery
-    property alias attitude: attitude
-    property alias flippers: flippers
-    property alias diagnostics: diagnostics
-    // Whether the window is the one that gets the keys.
-    property bool inFront: true
+    readonly property bool inFront: Window.active
     readonly property bool wide: width > 1.15 * height
     // True if the panels have room; a smaller window shows only the image, the stick and the stop.
     readonly property bool roomy: wide ? width >= 620 && height >= 400
@@ -36,128 +24,80 @@ Item {
     readonly property real control: strip > 0 ? strip - 20
         : Math.min(width * 0.36, tall * 0.6, Math.max(110, Math.min(170, cameraTall * 0.24)))
     // Distance of the controls from the image's lower edge, where its clock is.
-    readonly property real rim: camera.height - camera.pictureRect.y - camera.pictureRect.height
-        + camera.pictureRect.height * 26 / 480 + 12
-    readonly property real margin: cockpit.cramped ? 6 : 22
+    readonly property real rim: camera.height - camera.imageRect.y - camera.imageRect.height
+        + camera.imageRect.height * 26 / 480 + 12
+    readonly property real margin: cramped ? 6 : 22
     // Where the controls' lower edges are.
     readonly property real floor: strip > 0
         ? camera.y + cameraTall + (wide ? (tall - cameraTall + control) / 2 : control + 10)
         : camera.y + cameraTall - rim
 
-    focus: true
-
-    onInFrontChanged: if (!inFront) letGo()
-    onActiveFocusChanged: if (!activeFocus) letGo()
-
-    // Whatever was held down: its release may never be seen.
-    function letGo() {
-        keyboard.clear()
-        stop.cancelHold()
-        keys.clear()
-        drive.release()
+    // Whether the robot is there: judged by what it sends, not by what the middleware believes.
+    LiveTopic {
+        id: link; objectName: "link"
+        readonly property bool alive: !stale
+        readonly property string text: alive ? (problem ? "CHECK THE ROBOT" : "CONNECTED")
+            : age >= 0 ? "ROBOT LOST " + age.toFixed(0) + " s AGO" : "WAITING FOR THE ROBOT"
+        // Why there is nothing to see.
+        readonly property string reason: alive ? ""
+            : Ros2.connectionState === "connected"
+                ? "the " + Ros2.connectionDetail + " answers, the robot does not" : Ros2.connectionDetail
+        topic: "/odom"; types: ["nav_msgs/msg/Odometry"]; timeout: 700; throttleRate: 30
     }
-
-    Keys.onPressed: function (event) {
-        event.accepted = true
-        if (event.key === Qt.Key_Space || event.key === Qt.Key_Escape)
-            stop.press()
-        else if (event.modifiers & (Qt.ControlModifier | Qt.AltModifier))
-            event.accepted = event.isAutoRepeat
-        else if (event.isAutoRepeat || !keyboard.press(event.key))
-            return
-        else if (keys.press(event.key))
-            return
-        else if (event.key === Qt.Key_Return || event.key === Qt.Key_Enter)
-            stop.beginHold()
-        else if (event.key === Qt.Key_Tab || event.key === Qt.Key_Backtab)
-            event.accepted = false
-        else if (event.key === Qt.Key_L)
-            lamp.toggle()
-        else if (event.key === Qt.Key_R || event.key === Qt.Key_F)
-            flippers.nudge(event.key === Qt.Key_R ? 0.2 : -0.2, 0)
-        else if (event.key === Qt.Key_T || event.key === Qt.Key_G)
-            flippers.nudge(0, event.key === Qt.Key_T ? 0.2 : -0.2)
-        else
-            event.accepted = false
-    }
-    Keys.onReleased: function (event) {
-        if (!event.isAutoRepeat)
-            keyboard.lift(event.key)
-    }
-
-    Link {
-        id: link
-        objectName: "link"
-        pulse: map.odom
-    }
-    Drive {
-        id: drive
-        objectName: "drive"
+    TwistCommand {
+        id: drive; objectName: "drive"; topic: "/cmd_vel"; maxSpeed: 0.9; maxTurn: 1.2
         reachable: link.alive
-        obstacle: stop.blocks ? "emergency stop"
-            : !camera.live ? "no live image"
-            : !link.alive ? "no robot"
-            : !cockpit.inFront ? "window not in front" : ""
+        obstacle: stop.blocks ? "emergency stop" : !camera.live ? "no live image" : !link.alive ? "no robot" : ""
     }
     DriveKeys {
-        id: keys
-        drive: drive
+        objectName: "keys"; command: drive; keycaps: false
     }
-    HeldKeys {
-        id: keyboard
-        onLifted: function (key) {
-            keys.lift(key)
-            if (key === Qt.Key_Return || key === Qt.Key_Enter)
-                stop.cancelHold()
+    WindowKeys {
+        keys: [Qt.Key_L, Qt.Key_R, Qt.Key_F, Qt.Key_T, Qt.Key_G]
+        onPressed: function (key) {
+            if (key === Qt.Key_L)
+                lamp.toggle()
+            else if (key === Qt.Key_R || key === Qt.Key_F)
+                flippers.nudge(key === Qt.Key_R ? 0.2 : -0.2, 0)
+            else
+                flippers.nudge(0, key === Qt.Key_T ? 0.2 : -0.2)
         }
     }
 
     TopBar {
-        id: bar
-        width: parent.width
+        id: bar; width: parent.width
         link: link
-        live: camera.live
-        framerate: camera.framerate
-        latency: camera.latency
+        camera: camera
     }
     CameraView {
-        id: camera
-        objectName: "camera"
-        x: Theme.gap
-        y: bar.height + Theme.gap
-        width: cockpit.cameraWidth
-        height: cockpit.cameraTall
+        id: camera; objectName: "camera"; x: Theme.gap; y: bar.height + Theme.gap
+        width: cockpit.cameraWidth; height: cockpit.cameraTall
+        topic: "/camera/image_raw"; title: "front camera"; transport: "raw"
         reason: link.reason
+        buttons: false
+        // The figures of `rosglass demo` are read from the pixels of the image.
+        fullResolution: true
     }
     // What is live may still not be what the operator takes it for.
     Rectangle {
-        objectName: "warning"
-        visible: link.alive && link.problem !== ""
+        objectName: "warning"; visible: link.alive && link.problem !== ""
         anchors { horizontalCenter: camera.horizontalCenter; top: camera.top; topMargin: 48 }
         width: Math.min(camera.width - 24, warning.implicitWidth + 32)
-        height: warning.height + 16
-        radius: Theme.radius
-        color: "#f0332708"
+        height: warning.height + 16; radius: Theme.radius; color: Theme.panel
         border { color: Theme.warn; width: 2 }
-        Text {
-            id: warning
-            objectName: "warningText"
+        ThemeText {
+            id: warning; objectName: "warningText"
             anchors.centerIn: parent
-            width: Math.min(implicitWidth, camera.width - 56)
-            text: link.problem
-            textFormat: Text.PlainText
+            width: Math.min(implicitWidth, camera.width - 56); text: link.problem
             color: Theme.warn
             wrapMode: Text.Wrap
             maximumLineCount: 8
-            elide: Text.ElideRight
             horizontalAlignment: Text.AlignHCenter
-            font { pixelSize: Theme.normal; weight: Font.DemiBold }
+            font.weight: Font.DemiBold
         }
     }
     Item {
-        id: side
-        objectName: "side"
-        visible: cockpit.roomy
+        id: side; objectName: "side"; visible: cockpit.roomy
         x: cockpit.wide ? parent.width - width - Theme.gap : Theme.gap
         y: cockpit.wide ? camera.y : camera.y + cockpit.cameraTall + cockpit.strip + Theme.gap
         width: cockpit.wide ? cockpit.sideWidth : cockpit.width - 2 * Theme.gap
@@ -172,76 +112,62 @@ Item {
         readonly property real listTall: Math.floor(Math.max(80, Math.min(148, height * (cockpit.wide ? 0.2 : 0.4))))
 
         MapView {
-            id: map
-            objectName: "map"
+            id: map; objectName: "map"
             width: cockpit.wide ? parent.width : parent.half
-            height: side.mapTall
+            height: side.mapTall; topic: "/map"; scans: ["/scan"]; follow: true
+            tools: false
         }
         Attitude {
-            id: attitude
-            objectName: "attitude"
+            id: attitude; objectName: "attitude"
             x: cockpit.wide ? 0 : side.second
             y: cockpit.wide ? side.mapTall + Theme.gap : 0
             width: cockpit.wide ? side.half : (side.half - Theme.gap) / 2
-            height: side.rowTall
+            height: side.rowTall; topic: "/imu"
+            note: isNaN(roll) ? "" : pitch.toFixed(0) + "° / " + roll.toFixed(0) + "°"
         }
         Battery {
-            id: battery
-            objectName: "battery"
-            x: attitude.x + attitude.width + Theme.gap
-            y: attitude.y
-            width: attitude.width
-            height: side.rowTall
+            objectName: "battery"; x: attitude.x + attitude.width + Theme.gap
+            y: attitude.y; width: attitude.width; height: side.rowTall
+            topic: "/battery_state"
         }
         Flippers {
-            id: flippers
-            objectName: "flippers"
-            x: attitude.x
+            id: flippers; objectName: "flippers"; x: attitude.x
             y: attitude.y + side.rowTall + Theme.gap
             width: cockpit.wide ? side.width : side.half
             height: side.rowTall
         }
-        Diagnostics {
-            id: diagnostics
-            objectName: "diagnostics"
-            y: side.height - height
+        DiagnosticsView {
+            objectName: "diagnostics"; y: side.height - height
             width: cockpit.wide ? side.width : side.half
-            height: side.listTall
+            height: side.listTall; topic: "/diagnostics"
         }
     }
 
+    Rectangle {
+        anchors { fill: speed; margins: -6 }
+        visible: speed.visible; radius: Theme.radius; color: Theme.shade
+    }
     Speed {
-        id: speed
-        objectName: "speed"
+        id: speed; objectName: "speed"; framed: false
         anchors { horizontalCenter: camera.horizontalCenter; bottom: camera.bottom; bottomMargin: cockpit.rim }
         // On a small image it would hide the reason for a missing one.
-        visible: cockpit.roomy && (camera.live || refused || cockpit.strip === 0)
-        room: camera.width - 20 - (cockpit.strip > 0 ? 0 : 2 * cockpit.control + 100)
-        odom: map.odom
-        drive: drive
+        visible: cockpit.roomy && (camera.live || refusal !== "" || cockpit.strip === 0)
+        width: Math.min(implicitWidth, camera.width - 20 - (cockpit.strip > 0 ? 0 : 2 * cockpit.control + 100))
+        topic: "/odom"; command: drive
     }
     DriveStick {
-        id: stick
-        objectName: "stick"
-        drive: drive
-        width: cockpit.control
-        height: width
-        x: camera.x + cockpit.margin
-        y: cockpit.floor - height
+        id: stick; objectName: "stick"; command: drive; width: cockpit.control
+        height: width; x: camera.x + cockpit.margin; y: cockpit.floor - height
     }
     Lamp {
-        id: lamp
-        objectName: "lamp"
+        id: lamp; objectName: "lamp"
         anchors { right: stop.left; bottom: stop.bottom; rightMargin: Math.min(14, cockpit.margin) }
         visible: cockpit.roomy
     }
     // Whatever else finds no room: this is inside the window, and on top.
     EmergencyStop {
-        id: stop
-        objectName: "stop"
-        z: 1000
-        width: cockpit.control
-        height: width
+        id: stop; objectName: "stop"; z: 1000; topic: "/emergency_stop"
+        stopKeys: ["Space", "Escape"]; width: cockpit.control; height: width
         x: Math.max(0, camera.x + camera.width - cockpit.margin - width)
         y: Math.max(0, Math.min(cockpit.height - height, cockpit.floor - height))
     }

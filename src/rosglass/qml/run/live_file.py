@@ -258,10 +258,7 @@ def _advice(text: str) -> str:
 #: Module -> the package above this one that registers its types, once a file imports it.
 _REGISTERED_BY = {"RosControls": "rosglass.controls.modules"}
 if QT6:
-    _REGISTERED_BY |= {
-        "RosScene": "rosglass.scene.app.modules",
-        "RosglassDemo": "rosglass.demo.app",
-    }
+    _REGISTERED_BY["RosScene"] = "rosglass.scene.app.modules"
 #: The QML file of a closable item that is only as large as its text.
 PANEL = Path(__file__).with_name("ErrorPanel.qml")
 #: Headings of an ErrorView, for what is below it.

@@ -84,6 +84,8 @@ LiveFrame {
                 return parts.join(" · ")
             }
             color: battery.charging ? Theme.good : Theme.dim
+            wrapMode: Text.Wrap
+            maximumLineCount: 2
             font.pixelSize: Theme.small
         }
     }

@@ -20,8 +20,7 @@ LiveFrame {
     readonly property real sideways: twist_ ? twist_.linear.y : NaN
     readonly property real turn: twist_ ? twist_.angular.z : NaN
     // Why a steered robot does not drive, in words; empty if it does, or is not steered.
-    readonly property string refusal: !command || !command.holder || command.active ? ""
-        : command.problem || command.obstacle || qsTr("let go first")
+    readonly property string refusal: command ? command.refusal : ""
     readonly property var message: live.message
 
     readonly property var twist_: !message ? null : live.messageType === "geometry_msgs/msg/Twist" ? message

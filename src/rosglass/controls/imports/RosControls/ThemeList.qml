@@ -15,11 +15,15 @@ FocusScope {
     property string more
     property color moreTint: Theme.dim
     // Rows below what is in sight.
-    readonly property int below: {
-        // What it depends on, for the binding.
-        const bottom = view.contentY + view.height - 1, all = view.contentHeight
-        const last = all > view.height ? view.indexAt(1, bottom) : view.count - 1
-        return last < 0 ? 0 : view.count - 1 - last
+    readonly property int below: below_
+
+    property int below_: 0
+
+    // Later: the text that shows it takes height from the rows.
+    function count_() {
+        const bottom = view.contentY + view.height - 1
+        const last = view.contentHeight > view.height ? view.indexAt(1, bottom) : view.count - 1
+        below_ = last < 0 ? 0 : view.count - 1 - last
     }
 
     // A row was chosen, by Enter, space or a press.
@@ -42,6 +46,10 @@ FocusScope {
         boundsBehavior: Flickable.StopAtBounds
         highlightMoveDuration: 0
         interactive: contentHeight > height
+        onContentYChanged: Qt.callLater(list.count_)
+        onHeightChanged: Qt.callLater(list.count_)
+        onContentHeightChanged: Qt.callLater(list.count_)
+        onCountChanged: Qt.callLater(list.count_)
         Keys.onReturnPressed: if (currentIndex >= 0) list.chosen(currentIndex)
         Keys.onEnterPressed: if (currentIndex >= 0) list.chosen(currentIndex)
         Keys.onSpacePressed: if (currentIndex >= 0) list.chosen(currentIndex)
