@@ -86,6 +86,7 @@ class TwistCommand(Element):
     """
 
     _HOLDS = ("_inputs", "_steers")
+    _refusal: str
 
     #: Steering has ended by another cause than the hand that let go: the reason.
     halted = Signal(str)
