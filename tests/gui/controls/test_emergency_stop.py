@@ -384,3 +384,33 @@ def test_a_service_that_is_missing_is_said(controls: Any, wait: Any) -> None:
     wait(lambda: stop.property("stopped"))
     server.close()
     wait(lambda: not stop.property("known"))
+
+
+def test_topics_and_services_over_a_real_middleware(live_controls: Any, wait: Any) -> None:
+    controls = live_controls
+    latch = Latch(controls.robot, counter=True)
+    calls: list[bool] = []
+    server = controls.robot.create_service_server(
+        "/halt",
+        "std_srvs/srv/SetBool",
+        lambda request: calls.append(request.data) or {"success": True, "message": ""},
+    )
+    root = show(
+        controls,
+        wait,
+        """Item { property QtObject one: oneId; property QtObject other: otherId
+        EmergencyStop { id: oneId; width: 160; height: 160 }
+        EmergencyStop { id: otherId; x: 200; service: "/halt"; width: 160; height: 160 } }""",
+    )
+    one, other = root.property("one"), root.property("other")
+    wait(lambda: one.property("known"))
+    test.keyClick(controls.window, Key.Key_Space)
+    wait(lambda: one.property("stopped") and other.property("stopped"))
+    assert latch.stopped
+    for stop in (one, other):
+        stop.release()
+    wait(lambda: not one.property("blocks") and not other.property("blocks"))
+    assert not latch.stopped
+    assert calls[-1] is False
+    server.close()
+    latch.close()

@@ -275,6 +275,28 @@ def test_feedback_rumbles(controls: Any, wait: Any, plug: Any) -> None:
     wait(lambda: pad.rumbles[-1] == (0.0, 0.0), "the end of the rumble")
 
 
+def test_joy_and_feedback_over_a_real_middleware(live_controls: Any, wait: Any, plug: Any) -> None:
+    controls, got = live_controls, []
+    keep = controls.robot.create_subscription("/joy", "sensor_msgs/msg/Joy", got.append)
+    kind = "sensor_msgs/msg/JoyFeedbackArray"
+    feedback = controls.robot.create_publisher("/joy/set_feedback", kind)
+    pad = plug()
+    controls.show('Item { Gamepad { topic: "joy" } }')
+    in_front(controls, wait)
+    pad.axis(LEFT_X, -1.0)
+    wait(lambda: got and got[-1].axes[LEFT_X] == 1.0)
+
+    def rumbles() -> bool:
+        feedback.publish(array=[{"type": 1, "id": 0, "intensity": 0.5}])
+        return bool(pad.rumbles)
+
+    wait(rumbles)
+    pad.unplug()
+    wait(lambda: not any(got[-1].axes[:LEFT_TRIGGER]))
+    keep.close()
+    feedback.close()
+
+
 def test_the_gamepad_is_chosen_by_name_or_number(controls: Any, wait: Any, plug: Any) -> None:
     plug("Red Pad")
     plug("Blue Pad")

@@ -173,3 +173,16 @@ def test_modes_are_reached_by_keyboard(controls: Any, wait: Any) -> None:
     assert controls.find("mode1").property("activeFocus")
     test.keyClick(controls.window, key.Key_Enter)
     wait(lambda: modes.property("requested") == "auto" or outcome(controls))
+
+
+def test_modes_over_a_real_middleware(live_controls: Any, wait: Any) -> None:
+    controls = live_controls
+    state = controls.robot.create_publisher("/mode/state", STRING, QoS.latched())
+    keep = controls.robot.create_subscription("/mode", STRING, state.publish)
+    state.publish(data="manual")
+    modes = controls.show('ModeSwitch { width: 300; modes: ["manual", "auto"] }')
+    wait(lambda: modes.property("note") == "manual")
+    controls.click("mode1")
+    wait(lambda: modes.property("note") == "auto" and not modes.property("pending"))
+    keep.close()
+    state.close()
