@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 import pytest
-from test_map_view import grid, transform
+from map_messages import grid, transform
 
 from rosglass.comm import QoS
 from rosglass.qt import QtCore, optional
@@ -322,7 +322,7 @@ def test_drag_that_the_system_takes_away_sends_nothing(
     view.setProperty("tool", "goal")
     hand.press(3.0, 1.0)
     hand.move(3.5, 1.0)
-    assert view.property("draft_") is not None
+    assert controls.find("plane").property("draft") is not None
     controls.find("pointer").ungrabMouse()
     hand.release(3.5, 1.0)
     wait.settled(controls.engine_session)

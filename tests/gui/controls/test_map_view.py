@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from map_messages import grid, transform
 
 from rosglass.comm import QoS
 
@@ -15,31 +16,6 @@ if TYPE_CHECKING:
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 pytestmark = pytest.mark.both_qt
-
-
-def grid(
-    cells: Any, resolution: float = 0.1, frame: str = "map", x: float = 0.0, w: float = 1.0
-) -> dict[str, Any]:
-    """Return an occupancy grid whose lower left corner is at `x`, 0."""
-    rows = np.asarray(cells, np.int8)
-    origin = {"position": {"x": x}, "orientation": {"w": w}}
-    info = {
-        "resolution": resolution, "width": rows.shape[1], "height": rows.shape[0],
-        "origin": origin,
-    }  # fmt: skip
-    return {"header": {"frame_id": frame}, "info": info, "data": rows.ravel()}
-
-
-def transform(parent: str, child: str, x: float = 0.0, yaw: float = 0.0) -> dict[str, Any]:
-    """Return a transform."""
-    return {
-        "header": {"frame_id": parent},
-        "child_frame_id": child,
-        "transform": {
-            "translation": {"x": x},
-            "rotation": {"z": math.sin(yaw / 2), "w": math.cos(yaw / 2)},
-        },
-    }
 
 
 class Robot:

@@ -65,8 +65,6 @@ LiveFrame {
     }
 
     property bool fitted_: false
-    // The pose that is being dragged: null, or {x, y, yaw}.
-    property var draft_: null
 
     function place_(x, y, yaw) {
         const what = tool
@@ -111,7 +109,6 @@ LiveFrame {
     onFollowChanged: lookAtRobot_()
     onHeadingUpChanged: lookAtRobot_()
     onToolChanged: {
-        draft_ = null
         if (tool)
             goals_.prepare(tool)
         else
@@ -149,81 +146,23 @@ LiveFrame {
         ns: view.ns
     }
 
-    Item {
+    MapPlane {
         id: plane
         objectName: "plane"
         anchors.fill: parent
-        clip: true
-        activeFocusOnTab: true
-        Accessible.role: Accessible.Graphic
+        camera: camera_
+        aims: view.tool !== ""
+        from: scene_.robotSeen ? { x: scene_.robotX, y: scene_.robotY } : null
+        centered: view.follow
         Accessible.name: view.title
         Accessible.description: view.status || view.note
-        Accessible.focusable: true
+        onMoved: view.leave_()
+        onPosed: function(x, y, yaw) { view.place_(x, y, yaw) }
+        onClicked: function(x, y) { view.clicked(x, y) }
+        onHomeKey: view.fit()
+        onFollowKey: view.follow = !view.follow
+        onEscapeKey: view.tool = ""
 
-        Keys.onPressed: function(event) {
-            const step = Math.max(20, Math.min(width, height) / 10)
-            const shift = event.modifiers & Qt.ShiftModifier
-            event.accepted = true
-            switch (event.key) {
-            case Qt.Key_Left: shift ? camera_.rotateBy(Math.PI / 36, width / 2, height / 2) : drag(step, 0); break
-            case Qt.Key_Right: shift ? camera_.rotateBy(-Math.PI / 36, width / 2, height / 2) : drag(-step, 0); break
-            case Qt.Key_Up: drag(0, step); break
-            case Qt.Key_Down: drag(0, -step); break
-            case Qt.Key_Plus: case Qt.Key_Equal: view.zoomBy(1.25); break
-            case Qt.Key_Minus: view.zoomBy(0.8); break
-            case Qt.Key_Home: view.fit(); break
-            case Qt.Key_0: camera_.rotation = 0; break
-            case Qt.Key_F: view.follow = !view.follow; break
-            case Qt.Key_Comma: turn(Math.PI / 12); break
-            case Qt.Key_Period: turn(-Math.PI / 12); break
-            case Qt.Key_Return: case Qt.Key_Enter: enter(event); break
-            case Qt.Key_Escape: giveUp(event); break
-            default: event.accepted = false
-            }
-        }
-        function drag(x, y) {
-            view.leave_()
-            camera_.panBy(x, y)
-            aim()
-        }
-        // With the keyboard, a goal is set in the middle of the view.
-        function aim() {
-            if (!view.tool || pointer.pressed)
-                return
-            view.draft_ = { x: camera_.centerX, y: camera_.centerY, yaw: view.draft_ ? view.draft_.yaw : 0 }
-        }
-        function turn(angle) {
-            aim()
-            if (view.draft_)
-                view.draft_ = { x: view.draft_.x, y: view.draft_.y, yaw: view.draft_.yaw + angle }
-        }
-        function enter(event) {
-            if (!view.tool)
-                event.accepted = false
-            else if (!view.draft_)
-                aim()
-            else
-                release()
-        }
-        function giveUp(event) {
-            if (view.draft_)
-                view.draft_ = null
-            else if (view.tool)
-                view.tool = ""
-            else
-                event.accepted = false
-        }
-        function release() {
-            const pose = view.draft_
-            view.draft_ = null
-            if (pose)
-                view.place_(pose.x, pose.y, pose.yaw)
-        }
-
-        Rectangle {
-            anchors.fill: parent
-            color: Theme.mapUnknown
-        }
         Repeater {
             model: scene_.layers
             MapTiles {
@@ -243,7 +182,7 @@ LiveFrame {
             trackColor: Theme.accent
         }
         Repeater {
-            model: goals_.poses.concat(view.waypoints).concat(view.draft_ ? [view.draft_] : [])
+            model: goals_.poses.concat(view.waypoints).concat(plane.draft ? [plane.draft] : [])
             MapMark {
                 camera: camera_
                 pose: modelData
@@ -259,98 +198,11 @@ LiveFrame {
             color: scene_.robotKnown ? Theme.warn : Theme.bad
         }
 
-        PinchHandler {
-            id: pinch
-            target: null
-            property real scale_: 1
-            property real angle_: 0
-            property point at_
-
-            function begin_() {
-                scale_ = activeScale
-                angle_ = activeRotation
-                at_ = centroid.position
-            }
-            onActiveChanged: {
-                view.draft_ = null
-                view.leave_()
-                begin_()
-            }
-            onUpdated: {
-                const at = centroid.position
-                camera_.panBy(at.x - at_.x, at.y - at_.y)
-                camera_.zoomBy(activeScale / scale_, at.x, at.y)
-                camera_.rotateBy((angle_ - activeRotation) * Math.PI / 180, at.x, at.y)
-                begin_()
-            }
-        }
-        MouseArea {
-            id: pointer
-            objectName: "pointer"
-            anchors.fill: parent
-            hoverEnabled: true
-            acceptedButtons: Qt.LeftButton | Qt.RightButton | Qt.MiddleButton
-            cursorShape: view.tool ? Qt.CrossCursor : pressed ? Qt.ClosedHandCursor : Qt.ArrowCursor
-            property real lastX: 0
-            property real lastY: 0
-            property bool moved: false
-            property bool turns: false
-
-            onPressed: function(mouse) {
-                plane.forceActiveFocus(Qt.MouseFocusReason)
-                lastX = mouse.x
-                lastY = mouse.y
-                moved = false
-                turns = mouse.button === Qt.RightButton || (mouse.modifiers & Qt.ShiftModifier)
-                if (view.tool && mouse.button === Qt.LeftButton) {
-                    const at = camera_.toMap(mouse.x, mouse.y)
-                    view.draft_ = { x: at.x, y: at.y, yaw: scene_.robotSeen ? Math.atan2(at.y - scene_.robotY, at.x - scene_.robotX) : 0 }
-                }
-            }
-            onPositionChanged: function(mouse) {
-                if (!pressed)
-                    return
-                if (Math.hypot(mouse.x - lastX, mouse.y - lastY) > 4)
-                    moved = true
-                if (view.draft_) {
-                    const at = camera_.toMap(mouse.x, mouse.y)
-                    if (moved)
-                        view.draft_ = { x: view.draft_.x, y: view.draft_.y, yaw: Math.atan2(at.y - view.draft_.y, at.x - view.draft_.x) }
-                    return
-                }
-                if (!moved)
-                    return
-                if (turns) {
-                    const before = Math.atan2(lastY - height / 2, lastX - width / 2)
-                    const now = Math.atan2(mouse.y - height / 2, mouse.x - width / 2)
-                    camera_.rotateBy(before - now, width / 2, height / 2)
-                } else {
-                    view.leave_()
-                    camera_.panBy(mouse.x - lastX, mouse.y - lastY)
-                }
-                lastX = mouse.x
-                lastY = mouse.y
-            }
-            onReleased: function(mouse) {
-                if (view.draft_)
-                    plane.release()
-                else if (!moved && !view.tool) {
-                    const at = camera_.toMap(mouse.x, mouse.y)
-                    view.clicked(at.x, at.y)
-                }
-            }
-            // Not released by the hand: nothing is sent.
-            onCanceled: view.draft_ = null
-            onWheel: function(wheel) {
-                const about = view.follow ? Qt.point(width / 2, height / 2) : Qt.point(wheel.x, wheel.y)
-                camera_.zoomBy(Math.pow(1.2, wheel.angleDelta.y / 120), about.x, about.y)
-            }
-        }
         ThemeText {
             anchors { left: parent.left; bottom: parent.bottom; margins: Theme.gap / 2 }
             width: Math.min(implicitWidth, parent.width / 2)
-            visible: pointer.containsMouse
-            text: pointer.containsMouse && camera_.scale ? scene_.describe(camera_.toMap(pointer.mouseX, pointer.mouseY).x, camera_.toMap(pointer.mouseX, pointer.mouseY).y) : ""
+            visible: plane.hovered
+            text: plane.hovered ? scene_.describe(plane.at.x, plane.at.y) : ""
             color: Theme.dim
             font.pixelSize: Theme.small
         }
@@ -360,8 +212,6 @@ LiveFrame {
             longest: Math.min(120 * Theme.size, parent.width / 3)
         }
     }
-    FocusRing { item: plane; visible: plane.activeFocus }
-
     Flow {
         id: bar
         visible: view.tools
