@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from rosglass.qt import Property, QtCore, Signal, Slot
 
-__all__ = ["MapCamera", "Plane"]
+__all__ = ["MapCamera", "Plane", "Track"]
 
 #: Numbers of metres beyond which floating point is too coarse for a map.
 _MAX_METRES = 1e9
@@ -56,6 +56,45 @@ class Plane(NamedTuple):
         corners = [self.apply(x, y) for x in (0.0, width) for y in (0.0, height)]
         xs, ys = zip(*corners, strict=True)
         return min(xs), min(ys), max(xs), max(ys)
+
+
+#: Points of a track that are kept.
+_MOST_TRACK = 4000
+
+
+class Track:
+    """The way that a robot has come; its older parts become coarser.
+
+    Args:
+        step: Metres between two points.
+        jump: Metres in one step beyond which the robot was moved, or is another one.
+
+    Attributes:
+        points: x and y in metres, the newest last.
+        length: Metres since it began.
+    """
+
+    def __init__(self, step: float, jump: float) -> None:
+        self._step, self._jump = step, jump
+        self.points: list[tuple[float, float]] = []
+        self.length = 0.0
+
+    def append(self, x: float, y: float) -> None:
+        """Add where the robot is."""
+        points = self.points
+        step = math.dist(points[-1], (x, y)) if points else math.inf
+        if step > self._jump:
+            self.points, self.length = [(x, y)], 0.0
+        elif step >= self._step:
+            self.length += step
+            points.append((x, y))
+            if len(points) > _MOST_TRACK:
+                half = len(points) // 2
+                self.points = points[:half:2] + points[half:]
+
+    def clear(self) -> None:
+        """Begin a new one."""
+        self.points, self.length = self.points[-1:], 0.0
 
 
 def _number(name: str, low: float, high: float, *, clamps: bool) -> Any:

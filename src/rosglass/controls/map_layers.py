@@ -16,6 +16,7 @@ import numpy as np
 
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.comm.time import Time
+from rosglass.controls.geo_tiles import to_mercator
 from rosglass.controls.map_camera import Plane
 from rosglass.controls.map_grid import GridReader, theme_colors
 from rosglass.controls.map_tiles import TileLayer
@@ -67,6 +68,7 @@ class MapLayer(TopicElement):
     FOUND: ClassVar[tuple[str, ...]] = ()
     TIMEOUT_S: ClassVar[float] = 0.0
     DEPTH: ClassVar[int] = 1
+    NEEDS_FRAME: ClassVar[bool] = True
     _HOLDS = ("_queue",)
 
     topicChanged = Signal()
@@ -112,7 +114,7 @@ class MapLayer(TopicElement):
             self._executor,
             weak_callback(self._on_items),
             self.DEPTH,
-            needs_frame=True,
+            needs_frame=self.NEEDS_FRAME,
         )
         profiles, worker = self._profiles(topic), self._scene.worker
         return lambda: Subscriptions(node, profiles, queue, worker)
@@ -418,6 +420,17 @@ def read_particles(message: Any) -> Shape:
     return _finite(_columns(elements, f"{path}position.x", f"{path}position.y"), "poses")
 
 
+def read_geo_path(message: Any) -> Shape:
+    """Read a ``geographic_msgs/GeoPath``, in Mercator metres."""
+    _check_count(len(message.poses), _MOST_POSES, "poses")
+    points = np.full((len(message.poses), 2), np.nan)
+    for at, stamped in enumerate(message.poses):
+        position = stamped.pose.position
+        if abs(position.latitude) <= 90 and abs(position.longitude) <= 180:
+            points[at] = to_mercator(position.latitude, position.longitude)
+    return _finite(points, "poses")
+
+
 class Canvas:
     """The pixels into which points are drawn, of the size of the map.
 
@@ -623,6 +636,20 @@ class ParticleLayer(VectorLayer):
     KIND, TYPES = "particles", ("geometry_msgs/PoseArray", "nav2_msgs/ParticleCloud")
     FOUND = TYPES
     READ, COLOR, DOT = staticmethod(read_particles), "particleColor", 2
+
+
+class GeoPathLayer(VectorLayer):
+    """A path of degrees, on a ``GeoScene``."""
+
+    KIND, TYPES = "path", ("geographic_msgs/GeoPath",)
+    FOUND = TYPES
+    READ, COLOR = staticmethod(read_geo_path), "pathColor"
+    NEEDS_FRAME = False
+
+    def take(self, items: list[QueuedMessage]) -> None:
+        """Show the newest path where it is on the Earth."""
+        super().take(items)
+        self.pose = Plane(1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 
 
 #: The layers by their kind, those at the bottom first.

@@ -21,7 +21,7 @@ def _color(name: str) -> Any:
 
 
 class MapMarks(QtQuick.QQuickPaintedItem):
-    """Paints scans, paths, outlines, particles and the track of a ``MapScene``."""
+    """Paints scans, paths, outlines, particles and the track of a ``MapScene`` or ``GeoScene``."""
 
     scene = Writable(QtCore.QObject, None, then="_on_scene")
     scanColor = _color("red")
@@ -31,8 +31,6 @@ class MapMarks(QtQuick.QQuickPaintedItem):
     trackColor = _color("gray")
     #: Whether the track is painted.
     track = Writable(bool, True, then="update")
-    #: Metres between the lines of a grid; 0 for none.
-    grid = Writable(float, 0.0, then="update")
     gridColor = _color("gray")
 
     def __init__(self, parent: QtQuick.QQuickItem | None = None) -> None:
@@ -62,8 +60,10 @@ class MapMarks(QtQuick.QQuickPaintedItem):
 
         view = camera.to_screen()
         painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
-        if self.track and len(scene.track) > 1:
-            points = [QtCore.QPointF(x, y) for x, y in scene.track]
+        if hasattr(scene, "paint_under"):
+            scene.paint_under(painter, self.gridColor)
+        if self.track and len(scene.track.points) > 1:
+            points = [QtCore.QPointF(x, y) for x, y in scene.track.points]
             paint_line(painter, QtGui.QPolygonF(points), view, self.trackColor)
         if self._canvas is None:
             self._canvas = Canvas()
@@ -80,17 +80,19 @@ class MapArrow(QtQuick.QQuickPaintedItem):
 
     color = _color("orange")
     edgeColor = _color("white")
-    #: Whether it is filled.
-    filled = Writable(bool, True, then="update")
+    #: Whether it is a dot instead, without a heading.
+    round = Writable(bool, False, then="update")
 
     def paint(self, painter: QtGui.QPainter) -> None:
         """Paint it."""
         painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
         half = min(self.width(), self.height()) / 2 - 1
         middle = QtCore.QPointF(self.width() / 2, self.height() / 2)
+        painter.setPen(QtGui.QPen(self.edgeColor, 1.2))
+        painter.setBrush(self.color)
+        if self.round:
+            painter.drawEllipse(middle, half * 0.6, half * 0.6)
+            return
         corners = ((1.0, 0.0), (-0.75, 0.7), (-0.4, 0.0), (-0.75, -0.7))
         points = [QtCore.QPointF(x * half, y * half) + middle for x, y in corners]
-        painter.setPen(QtGui.QPen(self.edgeColor, 1.2))
-        if self.filled:
-            painter.setBrush(self.color)
         painter.drawPolygon(QtGui.QPolygonF(points))

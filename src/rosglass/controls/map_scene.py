@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.executor import Dispatcher
-from rosglass.controls.map_camera import MapCamera, Plane
+from rosglass.controls.map_camera import MapCamera, Plane, Track
 from rosglass.controls.map_tiles import TileImages
 from rosglass.errors import Error
 from rosglass.interfaces.names import ros1_name
@@ -38,10 +38,8 @@ _WAYPOINT_ACTIONS = ("nav2_msgs/action/FollowWaypoints", "nav2_msgs/action/Navig
 _OLD_GOAL = "move_base_simple/goal"
 #: Milliseconds between two looks at the transforms, while they change.
 _PLACE_MS = 33
-#: Metres between two points of the track, and points that are kept of it.
-_TRACK_STEP_M, _MOST_TRACK = 0.05, 4000
-#: Metres in one step beyond which the robot was moved, or is another one.
-_JUMP_M = 1.0
+#: Metres between two points of the track, and in one step beyond which a new one begins.
+_TRACK_STEP_M, _JUMP_M = 0.05, 1.0
 
 
 def _found(kind: str, name: str, types: Iterable[str], wanted: tuple[str, ...]) -> bool:
@@ -124,8 +122,7 @@ class MapScene(Element):
         self._lost = ""
         self.worker = Dispatcher("rosglass map")
         self._images: TileImages | None = None
-        #: x and y of the robot, the newest last.
-        self.track: list[tuple[float, float]] = []
+        self.track = Track(_TRACK_STEP_M, _JUMP_M)
         self._timer = QtCore.QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.setInterval(_PLACE_MS)
@@ -364,8 +361,8 @@ class MapScene(Element):
             return
         x, y, yaw = pose.e, pose.f, math.atan2(pose.c, pose.a)
         if (x, y, yaw) != (self.robotX, self.robotY, self.robotYaw) or not self.robotSeen:
-            self._extend_track(x, y)
-            report(self, robotX=x, robotY=y, robotYaw=yaw)
+            self.track.append(x, y)
+            report(self, robotX=x, robotY=y, robotYaw=yaw, driven=self.track.length)
         report(self, robotKnown=not self._is_robot_old(), robotSeen=True)
 
     def _is_robot_old(self) -> bool:
@@ -376,29 +373,15 @@ class MapScene(Element):
             return True
         return 0 < self.timeout / 1000 < buffer.silence(self.fixedFrame, self.robotFrame)
 
-    def _extend_track(self, x: float, y: float) -> None:
-        track = self.track
-        step = math.dist(track[-1], (x, y)) if track else 0.0
-        if not track or step > _JUMP_M:
-            self.track = [(x, y)]
-            report(self, driven=0.0)
-        elif step >= _TRACK_STEP_M:
-            report(self, driven=self.driven + step)
-            track.append((x, y))
-            if len(track) > _MOST_TRACK:
-                # Older parts become coarser.
-                half = len(track) // 2
-                self.track = track[:half:2] + track[half:]
-
     def _forget_robot(self) -> None:
-        self.track = []
+        self.track = Track(_TRACK_STEP_M, _JUMP_M)
         self._lost = ""
         report(self, robotKnown=False, robotSeen=False, driven=0.0)
 
     @Slot()
     def clearTrack(self) -> None:
         """Begin a new track."""
-        self.track = self.track[-1:]
+        self.track.clear()
         report(self, driven=0.0)
         self.repaint.emit()
 

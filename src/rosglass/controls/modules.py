@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.controls.diagnostics import DiagnosticsTopic
 from rosglass.controls.gamepad import Gamepad
+from rosglass.controls.geo_scene import GeoScene
 from rosglass.controls.graph_layout import GraphLayout
 from rosglass.controls.graph_watch import GraphWatch
 from rosglass.controls.live_topic import LiveTopic
@@ -42,6 +43,7 @@ TYPES: dict[str, type[QtCore.QObject]] = {
     "LiveValue": LiveValue,
     "LogTopic": LogTopic,
     "NodeParameters": NodeParameters,
+    "GeoScene": GeoScene,
     "MapArrow": MapArrow,
     "MapCamera": MapCamera,
     "MapMarks": MapMarks,

@@ -22,6 +22,7 @@ FILES = dict(
 PARTS = {name for name in FILES if name.startswith("Theme") and name != "Theme"} | {"FocusRing"}
 #: Parts of one control, whose page names them.
 MAP_PARTS = {name for name in {*FILES, *TYPES} if name.startswith("Map") and name != "MapView"}
+MAP_PARTS |= {"GeoScene"}
 EXAMPLES = sorted(ROOT.glob("examples/controls/*.qml"))
 _OWN = re.compile(
     r"^    (?:default |readonly )?(?:property (?:alias )?(?:[\w<>.]+ )?|signal |function )(\w+)",

@@ -10,6 +10,8 @@ MapArrow {
     // {x, y, yaw} in metres and radians.
     property var pose: null
     property string label
+    // Whether it has no heading.
+    property bool isDot: false
 
     readonly property point at_: camera && camera.scale && camera.rotation < 1e9 && camera.width + camera.height + camera.centerX + camera.centerY < 1e12 && pose ? camera.toScreen(pose.x, pose.y) : Qt.point(-100, -100)
 
@@ -19,6 +21,7 @@ MapArrow {
     y: at_.y - height / 2
     rotation: camera && pose ? -(pose.yaw + camera.rotation) * 180 / Math.PI : 0
     edgeColor: Theme.panel
+    round: isDot
 
     ThemeText {
         anchors.centerIn: parent
