@@ -19,9 +19,13 @@ from rosglass.wires.zenoh.router import Router
 ROOT = Path(__file__).parents[1]
 EXAMPLES, TARGET = ROOT / "examples", ROOT / "docs" / "images" / "examples"
 CONTROLS = ROOT / "docs" / "images" / "controls"
-PARTNERS = {"figure4": "pose_prediction.py", "figure5": "humanoid.py"}
+PARTNERS = {
+    "figure4": "paper/pose_prediction.py",
+    "figure5": "paper/humanoid.py",
+    "geo_map": "controls/gps.py",
+}
 #: Seconds until an example shows what it is about, where it is more than usual.
-AFTER = {"replay": 12, "image_publisher": 8, "camera": 8}
+AFTER = {"replay": 12, "image_publisher": 8, "camera": 8, "geo_map": 8}
 ROSGLASS = [sys.executable, "-m", "rosglass.cli"]
 #: The program with a virtual gamepad, for which it waits until SDL has been started.
 WITH_GAMEPAD = """
@@ -53,8 +57,7 @@ def main(names: list[str]) -> None:
     with Router("tcp/127.0.0.1:0") as router:
         commands = [[*ROSGLASS, "robot", "--url", router.url]]
         commands += [
-            [sys.executable, str(EXAMPLES / "paper" / name), router.url]
-            for name in PARTNERS.values()
+            [sys.executable, str(EXAMPLES / name), router.url] for name in PARTNERS.values()
         ]
         partners = [subprocess.Popen(command) for command in commands]
         try:

@@ -249,8 +249,9 @@ class GeoScene(Element):
         south, west = from_mercator(left, bottom)
         north, east = from_mercator(right, top)
         view = camera.to_screen()
-        painter.setPen(QtGui.QPen(color, 1))
-        degrees = _LEAST_PX / camera.scale / EARTH_M * 180
+        faint = QtGui.QColor(color)
+        faint.setAlphaF(0.35)
+        degrees = _LEAST_PX / math.hypot(view.a, view.c) / EARTH_M * 180
         step = next((one for one in _STEPS if one >= degrees), 30.0)
         digits = max(0, math.ceil(-math.log10(step) - 1e-9))
         for first, last, is_latitude in ((west, east, False), (south, north, True)):
@@ -261,7 +262,9 @@ class GeoScene(Element):
                     for end in ((west, east) if is_latitude else (south, north))
                 ]
                 a, b = (QtCore.QPointF(*view.apply(*end)) for end in ends)
+                painter.setPen(faint)
                 painter.drawLine(a, b)
-                at = (4.0, a.y() - 3) if is_latitude else (a.x() + 3, camera.height - 6)
+                painter.setPen(color)
+                at = (4.0, a.y() - 3) if is_latitude else (a.x() + 3, camera.height - 28)
                 text = _degrees(value, "NS" if is_latitude else "EW", digits)
                 painter.drawText(QtCore.QPointF(*at), text)
