@@ -34,6 +34,7 @@ import RosControls 1.0
 Window {
     id: window
     objectName: "window"
+    title: "teleoperation"
     x: 0; y: 0; width: 600; height: 400
     visible: true
     property int version: 1
@@ -93,8 +94,11 @@ Window {
 
 @contextmanager
 def stays_connected(display: str) -> Iterator[None]:
-    """Keep a client on an X server, which begins anew when the last one has left."""
-    client = subprocess.Popen(["xdotool", "sleep", "3600"], env={**os.environ, "DISPLAY": display})
+    """Show the window of another program, as an X server begins anew without a client."""
+    command = ["xlogo", "-geometry", "60x60+700+300"]
+    client = subprocess.Popen(
+        command, env={**os.environ, "DISPLAY": display}, stderr=subprocess.DEVNULL
+    )
     try:
         yield
     finally:
@@ -165,6 +169,10 @@ class Screen:
             text=True,
             bufsize=1,
         )
+        # One for all input: starting another one takes longer than what is measured.
+        self._input = subprocess.Popen(
+            ["xdotool", "-"], env=self._env, stdin=subprocess.PIPE, text=True, bufsize=1
+        )
         self.lines: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -180,9 +188,10 @@ class Screen:
 
     def reset(self) -> None:
         """Undo what the ways to let go did."""
-        self.x11("mouseup", 1, "keyup", "w", "mousemove", *_STICK)
+        self.x11("mouseup 1; keyup w; mousemove", *_STICK)
         since = len(self.lines)
         self.ask("reset()")
+        self.x11("search --name teleoperation windowfocus")
         self._wait_until_ready(since)
 
     @property
@@ -204,9 +213,12 @@ class Screen:
         return float(eventually(began, lambda: self.text, turn=lambda: time.sleep(0.001)))
 
     def x11(self, *words: object) -> float:
-        """Run xdotool; return when it began."""
+        """Give a command to xdotool; return when it was given."""
+        assert self._input.stdin is not None
         began = time.monotonic()
-        subprocess.run(["xdotool", *map(str, words)], env=self._env, check=True, timeout=30)
+        for word in " ".join(map(str, words)).split(";"):
+            self._input.stdin.write(f"{word.strip()}\n")
+        self._input.stdin.flush()
         return began
 
     def signal(self, number: int) -> float:
@@ -225,6 +237,8 @@ class Screen:
             self._process.kill()
         self._process.wait(10)
         self._reader.join(5)
+        self._input.kill()
+        self._input.wait(10)
 
 
 # -- holding, and letting go ---------------------------------------------------------------------
@@ -233,7 +247,7 @@ class Screen:
 def drag(screen: Screen) -> None:
     """Pull the stick ahead with the mouse."""
     x, y = _STICK
-    screen.x11("mousemove", x, y, "mousedown", 1, "mousemove", x, y - 60)
+    screen.x11("mousemove", x, y, "; mousedown 1; mousemove", x, y - 60)
 
 
 def press(screen: Screen) -> None:
@@ -308,6 +322,9 @@ WAYS: dict[str, Way] = {
     "pointer grab lost": Way(drag, _asks("item('touch').ungrabMouse()")),
     "dead-man released": Way(push, _asks("set('window', 'pushed', False)")),
     "focus lost": Way(press, _asks("item('other').show(); item('other').requestActivate()")),
+    "focus to another program": Way(
+        press, lambda screen: screen.x11("search --class xlogo windowfocus")
+    ),
     "window hidden": Way(drag, _asks("item('window').hide()")),
     "window minimised": Way(drag, _asks("item('window').showMinimized()")),
     "tab changed": Way(press, _asks("set('page', 'visible', False)")),

@@ -2,12 +2,62 @@
 
 from __future__ import annotations
 
-from typing import Any
+import ctypes
+import sys
+from typing import TYPE_CHECKING, Any
 
 from rosglass.qml.elements.image_sinks import window_of
 from rosglass.qt import QtCore, QtGui, QtQuick, address
 
-__all__ = ["find_item", "obstruction"]
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["FocusWatch", "find_item", "obstruction"]
+
+#: X11's FocusOut events: the type, the modes in which the focus really moves (NotifyNormal and
+#: NotifyWhileGrabbed), and the details by which it stays in the window (NotifyInferior), or is not
+#: the keyboard's (NotifyPointer).
+_FOCUS_OUT, _MODES, _NOT_LEFT = 10, (0, 3), (2, 5)
+
+
+class FocusWatch(QtCore.QAbstractNativeEventFilter):
+    """Notices on X11 at once that a window loses the focus; Qt waits 0.1 s for another one.
+
+    It costs 8 us for each event of the X server while it is used.
+
+    Args:
+        on_lost: Called on the GUI thread.
+    """
+
+    def __init__(self, on_lost: Callable[[], None]) -> None:
+        super().__init__()
+        self._on_lost, self._window = on_lost, 0
+
+    def start(self) -> None:
+        """Watch the window that has the focus; safe to call twice."""
+        focus = QtGui.QGuiApplication.focusWindow()
+        if focus is None or QtGui.QGuiApplication.platformName() != "xcb":
+            return
+        if not self._window:
+            QtCore.QCoreApplication.instance().installNativeEventFilter(self)
+        self._window = int(_outermost(focus).winId())
+
+    def stop(self) -> None:
+        """Stop watching; safe to call twice, but not from `on_lost`."""
+        app = QtCore.QCoreApplication.instance()
+        if self._window and app is not None:
+            app.removeNativeEventFilter(self)
+        self._window = 0
+
+    def nativeEventFilter(self, kind: Any, message: Any) -> Any:  # noqa: N802
+        """Look at an event of the X server; Qt calls this before each one is handled."""
+        if bytes(kind) == b"xcb_generic_event_t":
+            # xcb_focus_out_event_t: type, detail, sequence, window, mode.
+            raw = ctypes.string_at(int(message), 9)
+            leaves = raw[0] & 0x7F == _FOCUS_OUT and raw[8] in _MODES and raw[1] not in _NOT_LEFT
+            if leaves and int.from_bytes(raw[4:8], sys.byteorder) == self._window:
+                self._on_lost()
+        return False, 0
 
 
 def find_item(thing: Any, kept: list[Any]) -> QtQuick.QQuickItem | QtGui.QWindow | None:

@@ -10,7 +10,7 @@ from weakref import ref
 
 from rosglass.comm.qos import QoS
 from rosglass.controls.command_sender import CommandSender, Limits, Velocity
-from rosglass.controls.in_front import find_item, obstruction
+from rosglass.controls.in_front import FocusWatch, find_item, obstruction
 from rosglass.errors import Error, UnsupportedError
 from rosglass.interfaces.names import join_name
 from rosglass.qml.elements.element import Element
@@ -129,6 +129,7 @@ class TwistCommand(Element):
         super().__init__(parent)
         self._inputs: dict[int, _Input] = {}
         self._steers: _Input | None = None
+        self._focus = FocusWatch(weak_callback(self._on_focus_lost))
         #: The type of the topic's subscribers.
         self._found = _TWIST
 
@@ -228,6 +229,8 @@ class TwistCommand(Element):
 
     def _begin(self, one: _Input, wanted: tuple[float, float, float]) -> None:
         self._watch_window(one)
+        if one.window is not None:
+            self._focus.start()
         self._steers = one
         self._endpoint.begin(*map(_unit, wanted))
 
@@ -269,6 +272,10 @@ class TwistCommand(Element):
         reason = self._reason_against(holder)
         if reason:
             self._halt(reason)
+
+    def _on_focus_lost(self) -> None:
+        if is_alive(self):
+            self._halt("the window is not in front")
 
     def _on_sender_halt(self, _: str) -> None:
         """Follow a halt of the sender's own."""
@@ -322,6 +329,8 @@ class TwistCommand(Element):
                 one.held, one.off = False, ""
                 if one is self._steers:
                     self._let_go()
+        if self._steers is None:
+            self._focus.stop()
         if self._endpoint is not None:
             self._set_problem(self._endpoint.publisher.problem)
         self._show()
@@ -333,6 +342,7 @@ class TwistCommand(Element):
             return False
         app: Any = QtCore.QCoreApplication.instance()
         app.aboutToQuit.connect(self._on_quit)
+        self._cleanup["focus"] = self._focus.stop
         if isinstance(app, QtGui.QGuiApplication):
             app.focusWindowChanged.connect(self._check)
         engine = self._runtime.engine if self._runtime is not None else None
