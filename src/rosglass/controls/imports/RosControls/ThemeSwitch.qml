@@ -34,7 +34,7 @@ T.Switch {
     }
     contentItem: ThemeText {
         id: label
-        leftPadding: toggle.indicator.width + Theme.gap
+        leftPadding: Theme.touch + Theme.gap
         visible: toggle.text !== ""
         text: toggle.text
         color: toggle.enabled ? Theme.text : Theme.faint

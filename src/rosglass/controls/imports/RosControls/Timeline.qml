@@ -151,11 +151,12 @@ LiveFrame {
     Row {
         id: row
         anchors { left: parent.left; right: parent.right; top: slider.bottom; topMargin: Theme.gap / 2 }
-        spacing: Theme.gap
+        spacing: narrow ? Theme.gap / 2 : Theme.gap
+        readonly property bool narrow: width < 460 * Theme.size
 
         ThemeButton {
             objectName: "play"
-            width: 80 * Theme.size
+            width: Math.max(implicitWidth, (row.narrow ? 60 : 80) * Theme.size)
             text: timeline.playing ? qsTr("Pause") : qsTr("Play")
             enabled: timeline.ready
             onClicked: timeline.toggle()
@@ -178,7 +179,7 @@ LiveFrame {
         }
         ThemeChoice {
             objectName: "rate"
-            width: 80 * Theme.size
+            width: (row.narrow ? 60 : 80) * Theme.size
             enabled: timeline.ready
             name: qsTr("Speed")
             model: timeline.rates.map(rate => qsTr("%1 x").arg(rate))
@@ -189,14 +190,16 @@ LiveFrame {
         ThemeSwitch {
             id: loop
             objectName: "loop"
-            text: qsTr("Loop")
+            text: row.narrow ? "" : qsTr("Loop")
             enabled: timeline.ready
+            Accessible.name: qsTr("Loop")
             onToggled: timeline.replay_.loop = checked
             Qml.Binding { target: loop; property: "checked"; value: !!timeline.replay_ && timeline.replay_.loop; restoreMode: Qml.Binding.RestoreNone }
         }
         ThemeText {
             objectName: "time"
             anchors.verticalCenter: parent.verticalCenter
+            width: Math.max(0, Math.min(implicitWidth, row.width - x))
             text: qsTr("%1 / %2").arg(timeline.time_(timeline.position)).arg(timeline.time_(timeline.duration))
             color: timeline.ready ? Theme.text : Theme.dim
         }
