@@ -149,6 +149,7 @@ class ParameterRows(QtCore.QAbstractListModel):
     def __init__(self, parent: NodeParameters) -> None:
         super().__init__(parent)
         self.rows: list[_Row] = []
+        self._places: dict[int, int] = {}
 
     def roleNames(self) -> dict[int, QtCore.QByteArray]:
         """Return the names of the roles."""
@@ -171,13 +172,14 @@ class ParameterRows(QtCore.QAbstractListModel):
             return
         self.beginResetModel()
         self.rows = rows
+        self._places = {id(row): at for at, row in enumerate(rows)}
         self.endResetModel()
 
     def update(self, row: _Row) -> None:
         """Notify views of a changed row."""
-        for at, shown in enumerate(self.rows):
-            if shown is row:
-                self.dataChanged.emit(self.index(at, 0), self.index(at, 0))
+        at = self._places.get(id(row))
+        if at is not None:
+            self.dataChanged.emit(self.index(at, 0), self.index(at, 0))
 
 
 class NodeParameters(Element):
