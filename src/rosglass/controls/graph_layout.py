@@ -26,7 +26,7 @@ __all__ = ["GraphLayout"]
 #: Milliseconds between two layouts.
 _PAUSE_MS = 500
 #: Nodes, topics and connections that are drawn at most; a filter finds the others.
-_MAX_VERTICES, _MAX_EDGES = 400, 2000
+_MAX_VERTICES, _MAX_EDGES = 400, 1000
 #: Names that nearly every node is connected to.
 _HIDE = ["/rosout", "/rosout_agg", "/parameter_events", "/clock"]
 _SEGMENT_ROLES = ("key", "start", "stop", "x1", "y1", "x2", "y2", "leaves", "enters")

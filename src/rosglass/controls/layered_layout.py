@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Layout", "lay_out"]
 
+#: Points in columns between their ends that all edges together pass; with more, all are straight.
+_MAX_BENDS = 1000
 #: Passes over all layers that reduce crossings, and that straighten edges.
 _ORDER_PASSES, _SHIFT_PASSES = 8, 8
 
@@ -26,7 +28,8 @@ class Layout:
         columns: Column of each vertex, from 0 on.
         rows: Middle of each vertex on the other axis; vertices of one column are at least 1 apart,
             the smallest is 0.
-        routes: For each edge the (column, row) that it passes, with both ends.
+        routes: For each edge the (column, row) that it passes, with both ends; one in each column,
+            unless the graph is so large that its edges are straight.
     """
 
     def __init__(
@@ -57,9 +60,11 @@ def lay_out(vertices: Iterable[str], edges: Iterable[tuple[str, str]]) -> Layout
     left: dict[str, list[str]] = {}
     right: dict[str, list[str]] = {}
     chains: dict[tuple[str, str], list[str]] = {}
-    for start, stop in sorted(set(forward.values())):
+    ahead = sorted(set(forward.values()))
+    is_bent = sum(columns[b] - columns[a] - 1 for a, b in ahead) <= _MAX_BENDS
+    for start, stop in ahead:
         chain = [start]
-        for column in range(columns[start] + 1, columns[stop]):
+        for column in range(columns[start] + 1, columns[stop]) if is_bent else ():
             chain.append(f"{start}\0{stop}\0{column}")
             layers[column].append(chain[-1])
         chain.append(stop)
