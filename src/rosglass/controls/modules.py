@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
+from rosglass.controls.alarms import Alarms
 from rosglass.controls.diagnostics import DiagnosticsTopic
 from rosglass.controls.gamepad import Gamepad
 from rosglass.controls.geo_scene import GeoScene
@@ -34,6 +35,7 @@ __all__ = ["TYPES", "register"]
 
 #: The types that are written in Python; ``imports/RosControls`` has those that are written in QML.
 TYPES: dict[str, type[QtCore.QObject]] = {
+    "Alarms": Alarms,
     "DiagnosticsTopic": DiagnosticsTopic,
     "GraphLayout": GraphLayout,
     "Gamepad": Gamepad,
