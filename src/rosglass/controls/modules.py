@@ -11,6 +11,7 @@ from rosglass.controls.gamepad import Gamepad
 from rosglass.controls.geo_scene import GeoScene
 from rosglass.controls.graph_layout import GraphLayout
 from rosglass.controls.graph_watch import GraphWatch
+from rosglass.controls.joints import JointTopic
 from rosglass.controls.live_topic import LiveTopic
 from rosglass.controls.live_value import LiveValue
 from rosglass.controls.log_topic import LogTopic
@@ -36,6 +37,7 @@ __all__ = ["TYPES", "register"]
 #: The types that are written in Python; ``imports/RosControls`` has those that are written in QML.
 TYPES: dict[str, type[QtCore.QObject]] = {
     "Alarms": Alarms,
+    "JointTopic": JointTopic,
     "DiagnosticsTopic": DiagnosticsTopic,
     "GraphLayout": GraphLayout,
     "Gamepad": Gamepad,

@@ -15,6 +15,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from rosglass.comm.xml_reader import XmlElement, XmlError, read_xml
 from rosglass.scene.data.triangles import (
     Color,
     MeshError,
@@ -26,7 +27,6 @@ from rosglass.scene.data.triangles import (
     relative,
     triangulate,
 )
-from rosglass.scene.data.xml_reader import XmlElement, XmlError, read_xml
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 import numpy as np
 
 from rosglass.comm.names import similar
+from rosglass.comm.xml_reader import XmlElement, XmlError, read_xml
 from rosglass.errors import ArgumentError, Error
-from rosglass.scene.data.xml_reader import XmlElement, XmlError, read_xml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
