@@ -48,6 +48,7 @@ _HELP = {
     "lifecycle_nodes": "name of the lifecycle node, e.g. /camera",
 }
 _rate = number(0, 10_000, "a rate above 0 and up to 10000", above=True)
+_plot_window = number(0.001, 2_592_000, "a number of seconds from 0.001 to 2592000 (30 days)")
 _time_within_a_day = number(0, 86_400, "a number of seconds from 0 to 86400")
 
 
@@ -117,7 +118,12 @@ def _add_overlays(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_interface_options(
-    parser: argparse.ArgumentParser, drawn: str, window: str, after: float
+    parser: argparse.ArgumentParser,
+    drawn: str,
+    window: str,
+    after: float,
+    *,
+    definitions: bool = True,
 ) -> None:
     """Declare the options of programs that show QML.
 
@@ -126,6 +132,7 @@ def _add_interface_options(
         drawn: The object that the renderer draws, for the help.
         window: The object of a screenshot, for the help.
         after: Default of --after, in seconds.
+        definitions: Whether to declare --definitions, too.
     """
     parser.add_argument(
         "--renderer",
@@ -161,7 +168,8 @@ def _add_interface_options(
         default=after,
         help="time until the screenshot (default: %(default)s)",
     )
-    add_definitions_option(parser)
+    if definitions:
+        add_definitions_option(parser)
 
 
 # -- interfaces ----------------------------------------------------------------------------------
@@ -228,6 +236,38 @@ def _run(parser: argparse.ArgumentParser) -> None:
         "-p speed:=1.5. Arguments after -- are passed to the interface, as "
         "Qt.application.arguments."
     )
+
+
+def _plot(parser: argparse.ArgumentParser) -> None:
+    _add_name(
+        parser, "paths", "plot_paths", nargs="+", metavar="TOPIC:FIELD",
+        help="topic and field, e.g. /odom:twist.twist.linear.x; [*] for each element of an array, "
+        "in quotes",
+    )  # fmt: skip
+    parser.add_argument(
+        "-w", "--window", type=_plot_window, default=30.0, metavar="SECONDS",
+        help="time that is visible (default: %(default)g)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--history", type=seconds, default=600.0, metavar="SECONDS",
+        help="time that is kept to scroll back; 0 for no limit (default: %(default)g)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--terminal", action="store_true",
+        help="plot in the terminal, without Qt; where the output is not a terminal, print one plot "
+        "after the window's time",
+    )  # fmt: skip
+    parser.add_argument(
+        "-d", "--duration", type=seconds, metavar="SECONDS",
+        help="exit after this time, with --terminal",
+    )  # fmt: skip
+    parser.add_argument(
+        "--color", choices=("auto", "always", "never"), default="auto",
+        help="colours in the terminal (default: %(default)s)",
+    )  # fmt: skip
+    add_connection_options(parser, timeout=TIMEOUT_S)
+    parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
+    _add_interface_options(parser, "the plot", "the window", after=5.0, definitions=False)
 
 
 def _rviz(parser: argparse.ArgumentParser) -> None:
@@ -983,6 +1023,7 @@ def _completion(parser: argparse.ArgumentParser) -> None:
 COMMANDS = {
     "run": (_run, "open an interface written in QML"),
     "rviz": (_rviz, "open RViz with interfaces over its 3D view"),
+    "plot": (_plot, "plot numbers of topics, in a window or the terminal"),
     "view": (_view, "show the robot in a 3D view like RViz's, without RViz"),
     "qml-path": (_qml_path, "print the folders of the QML modules, for editors"),
     "demo": (_demo, "open the demo cockpit on a simulated robot"),

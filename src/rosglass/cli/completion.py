@@ -88,6 +88,8 @@ def _names(what: str, args: argparse.Namespace) -> list[str]:
             if what == "lifecycle_nodes":
                 services = [name for name in node.services() if name.endswith("/get_state")]
                 return [name.removesuffix("/get_state") for name in services]
+            if what == "plot_paths":
+                return [f"{name}:" for name in node.topics()]
             return other_nodes(node) if what == "nodes" else list(getattr(node, what)())
 
         return wait(node, look, _DISCOVERY_TIMEOUT_S)

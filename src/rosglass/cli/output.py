@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CLEAR_LINE",
+    "CLEAR_REST",
+    "HOME",
     "EscapingStream",
     "ProblemReports",
     "Style",
@@ -30,7 +32,12 @@ __all__ = [
 _ESCAPE = f"\0{os.urandom(8).hex()}\0"
 #: Returns to the beginning of the line and clears it, on a terminal.
 CLEAR_LINE = f"{_ESCAPE}[G{_ESCAPE}[K"
-_CODES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "yellow": 33, "cyan": 36}
+#: Returns to the beginning of the screen and clears it, on a terminal; clears the rest of it.
+HOME, CLEAR_REST = f"{_ESCAPE}[H{_ESCAPE}[2J", f"{_ESCAPE}[J"
+_CODES = {
+    "bold": 1, "dim": 2, "red": 31, "green": 32, "yellow": 33, "blue": 34, "magenta": 35,
+    "cyan": 36,
+}  # fmt: skip
 
 
 class EscapingStream:
@@ -65,7 +72,7 @@ class Style:
         self._on = wanted == "always" or (wanted == "auto" and not plain)
 
     def __call__(self, text: object, *kinds: str) -> str:
-        """Return `text` as ``bold``, ``dim``, ``red``, ``green``, ``yellow`` or ``cyan``.
+        """Return `text` as ``bold``, ``dim``, or in the colour of one of these names.
 
         The text is for an :class:`EscapingStream`.
         """

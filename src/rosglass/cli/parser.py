@@ -62,6 +62,11 @@ EXAMPLES = {
     "param load": ("/camera camera.yaml",),
     "param set": ("/camera exposure 0.02",),
     "play": ("drive.mcap --clock --rate 2", "drive.mcap --topics /odom /scan --start 30"),
+    "plot": (
+        "/odom:twist.twist.linear.x /odom:twist.twist.angular.z",
+        "'/joint_states:position[*]' --window 60",
+        "/battery_state:voltage --terminal",
+    ),
     "qml-path": ("--qmlls-ini",),
     "record": ("-o drive.mcap", "/odom /scan -d 60"),
     "robot": ("--url zenoh://127.0.0.1:7447",),

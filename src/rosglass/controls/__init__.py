@@ -6,6 +6,12 @@ overlays register them when a file imports the module; a program with its own QM
 :func:`register`.
 """
 
-from rosglass.controls.modules import register
-
 __all__ = ["register"]
+
+
+def register() -> None:
+    """Register the types with Qt; only the first call has an effect."""
+    # The modules without Qt also serve the command line.
+    from rosglass.controls import modules  # noqa: PLC0415
+
+    modules.register()

@@ -20,6 +20,12 @@ if TYPE_CHECKING:
 __all__ = ["PlotLines"]
 
 
+def _image(raster: Raster) -> QtGui.QImage:
+    """Return an image that shares the memory of a raster."""
+    kind = QtGui.QImage.Format.Format_RGB32
+    return QtGui.QImage(raster.memory.data, raster.width, raster.height, 8 * raster.width, kind)
+
+
 class PlotLines(QtQuick.QQuickItem):
     """The item that draws the lines of a ``PlotData``."""
 
@@ -108,7 +114,7 @@ class PlotLines(QtQuick.QQuickItem):
             self._is_changed = True
         if self._is_changed:
             option = QtQuick.QQuickWindow.CreateTextureOption.TextureIsOpaque
-            self._node.setTexture(window.createTextureFromImage(raster.image(), option))
+            self._node.setTexture(window.createTextureFromImage(_image(raster), option))
             self._is_changed = False
         size = QtCore.QSizeF(raster.width / self._ratio, raster.height / self._ratio)
         self._node.setRect(QtCore.QRectF(QtCore.QPointF(0, 0), size))

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rosglass.qt import QtGui
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -143,13 +141,16 @@ class Raster:
         self._memory: Pixels = np.empty((height + 1, 2 * width), np.uint32)
         self._first = 0
 
-    def image(self) -> QtGui.QImage:
-        """Return the visible part, which shares this memory."""
+    @property
+    def memory(self) -> Pixels:
+        """The memory from the first visible pixel on; rows are 8 * width bytes apart."""
         start = self._first % self.width
-        view = self._memory.reshape(-1)[start : start + self.height * 2 * self.width]
-        return QtGui.QImage(
-            view.data, self.width, self.height, 8 * self.width, QtGui.QImage.Format.Format_RGB32
-        )
+        return self._memory.reshape(-1)[start : start + self.height * 2 * self.width]
+
+    @property
+    def pixels(self) -> Pixels:
+        """The visible part, a view of its memory."""
+        return self.memory.reshape(self.height, 2 * self.width)[:, : self.width]
 
     def draw(
         self, shown: Outline, colors: Pixels, curves: list[Curve], first: int, start: int

@@ -31,8 +31,7 @@ def extents(low: np.ndarray, high: np.ndarray, most: int = 5) -> object:
 
 
 def pixels(raster: Raster) -> np.ndarray:
-    image = raster.image()
-    return np.array([[image.pixel(x, y) & 0xFFFFFF for x in range(WIDTH)] for y in range(HEIGHT)])
+    return raster.pixels.copy()
 
 
 def empty(lines: int = 1) -> tuple[np.ndarray, np.ndarray]:
