@@ -69,6 +69,17 @@ def test_camera_is_found_and_shown_live(controls: Any, wait: Any) -> None:
     assert view.property("received"), "the last image stays under the veil"
 
 
+def test_camera_that_was_found_is_kept(controls: Any, wait: Any) -> None:
+    camera = Camera(controls)
+    view = controls.show("CameraView { anchors.fill: parent }")
+    wait(camera.publisher.subscription_count)
+    other = Camera(controls, "/a/image_raw")
+    wait(lambda: len(view.property("cameras").toVariant()) == 2)
+    wait.settled(controls.engine_session)
+    assert view.property("topic_") == "/camera/image_raw"
+    assert not other.publisher.subscription_count()
+
+
 def test_equal_images_are_frozen_not_live(controls: Any, wait: Any) -> None:
     camera = Camera(controls)
     view = controls.show("CameraView { anchors.fill: parent; frozenAfter: 0.5 }")

@@ -178,6 +178,23 @@ def test_recording_over_a_real_middleware(
     assert [text for _, text in read_marks(file)] == ["here"]
 
 
+def test_recording_is_completed_when_the_node_goes(
+    controls: Any, wait: Any, tmp_path: Path
+) -> None:
+    sender = publisher(controls)
+    recorder = show(controls, tmp_path, 'fileName: "gone"')
+    recorder.start()
+    wait(sender.subscription_count)
+    sending(wait, sender, lambda: recorder.property("messages"))
+    controls.engine_session.shutdown()
+    wait(lambda: ends(recorder))
+    assert not recorder.property("recording")
+    assert recorder.property("ending") == "the robot was changed"
+    with (tmp_path / "gone.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+
+
 def test_program_that_ends_completes_its_recording(start: Any, wait: Any, tmp_path: Path) -> None:
     """Marks alone are enough for a file, which has its index if the program ends by itself."""
     file = tmp_path / "program.qml"

@@ -81,7 +81,14 @@ FocusScope {
     signal snapshotSaved(string path)
     signal snapshotFailed(string reason)
 
-    readonly property string topic_: topic ? Fields.resolve(ns, topic) : cameras.length ? cameras[0] : ""
+    readonly property string topic_: topic ? Fields.resolve(ns, topic) : found_
+    // The camera found stays while it exists: another one that appears must not take its place.
+    property string found_
+    onCamerasChanged: keep_()
+    function keep_() {
+        if (cameras.length && cameras.indexOf(found_) < 0)
+            found_ = cameras[0]
+    }
     property bool settled_: false
     property string file_
     property string message_
@@ -317,6 +324,7 @@ FocusScope {
     onPanTiltTypeChanged: if (complete_) findPanTilt_()
     Component.onCompleted: {
         complete_ = true
+        keep_()
         findPanTilt_()
     }
     Connections {
