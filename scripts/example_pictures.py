@@ -89,7 +89,9 @@ def shrink(file: Path) -> None:
     while True:
         size = (round(whole.width * scale), round(whole.height * scale))
         small = whole if scale == 1 else whole.resize(size, Image.Resampling.LANCZOS)
-        small.quantize(64, dither=Image.Dither.NONE).save(file, optimize=True)
+        small.quantize(64, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
+            file, optimize=True
+        )
         if file.stat().st_size <= MOST:
             return
         scale *= 0.9

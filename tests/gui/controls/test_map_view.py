@@ -182,3 +182,158 @@ def test_camera_keeps_the_point_under_the_pointer_and_its_limits(controls: Any) 
     camera.fit(0, 0, 80, 20)
     x, y = camera.to_screen().apply(80, 20)
     assert (x, y) == (pytest.approx(780), pytest.approx(205))
+
+
+def test_costmaps_paths_footprints_and_particles_are_found_and_drawn(
+    controls: Any, robot: Robot, wait: Callable[..., None]
+) -> None:
+    robot.start()
+    node = controls.robot
+    costs = np.zeros((40, 60))
+    costs[:, 30:35], costs[:, 35:40], costs[:, 40:45] = 100, 99, 50
+    cost = node.create_publisher("/global_costmap/costmap", GRID, QoS.latched())
+    cost.publish(grid(costs))
+    path = node.create_publisher("/plan", "nav_msgs/msg/Path", QoS.latched())
+    poses = [{"pose": {"position": {"x": x, "y": 3.0}}} for x in (0.5, math.nan, 2.5)]
+    path.publish(header={"frame_id": "map"}, poses=poses)
+    kind = "geometry_msgs/msg/PolygonStamped"
+    outline = node.create_publisher("/footprint", kind, QoS.latched())
+    corners = [{"x": x, "y": y} for x, y in ((-0.5, -0.3), (0.5, -0.3), (0.5, 0.3), (-0.5, 0.3))]
+    outline.publish(header={"frame_id": "base_link"}, polygon={"points": corners})
+    node.create_publisher("/other_polygon", kind)
+    cloud = node.create_publisher("/particle_cloud", "geometry_msgs/msg/PoseArray", QoS.latched())
+    cloud.publish(header={"frame_id": "map"}, poses=[{"position": {"x": 1.0, "y": 2.0}}])
+    view = controls.show('MapView { anchors.fill: parent; colors: "map"; tools: false }', 640, 480)
+    scene = view.property("scene")
+    wait(lambda: len(scene.layers) == 5)
+    kinds = [(one.KIND, one.property("topic")) for one in scene.layers]
+    assert kinds == [
+        ("map", "/map"), ("costmap", "/global_costmap/costmap"), ("particles", "/particle_cloud"),
+        ("path", "/plan"), ("footprint", "/footprint"),
+    ]  # fmt: skip
+    wait(lambda: all(one.property("age") >= 0 for one in scene.layers))
+    wait(lambda: all(one.is_complete for one in (x.layer for x in scene.layers[:2])))
+    wait(lambda: "1 of 3 poses are not finite" in view.property("status"))
+
+    # Over white with RViz's opacity of 0.6: purple, cyan, between blue and red, transparent.
+    def drawn(x: float, y: float) -> tuple[int, int, int]:
+        return pixel(controls, view, x, y).getRgb()[:3]
+
+    wait(lambda: drawn(3.25, 1.0) == pytest.approx((255, 102, 255), abs=4))
+    assert drawn(3.75, 1.0) == pytest.approx((102, 255, 255), abs=4)
+    assert drawn(4.25, 1.0) == pytest.approx((178, 102, 178), abs=6)
+    assert drawn(5.5, 1.0) == pytest.approx((255, 255, 255), abs=2)
+    assert drawn(1.5, 3.0)[1] > drawn(1.5, 3.0)[0] + 60, "the path is green"
+    assert drawn(2.5, 0.2)[2] < 200, "the footprint is orange"
+    near = [drawn(1.0 + dx, 2.0 + dy) for dx in (-0.01, 0, 0.01) for dy in (-0.01, 0, 0.01)]
+    assert min(red for red, _, _ in near) < 200, "a particle"
+    scene.layers[1].shown = False
+    wait(lambda: cost.subscription_count() == 0)
+    wait(lambda: drawn(3.25, 1.0) == pytest.approx((255, 255, 255), abs=2))
+    scene.layers[1].shown = True
+    wait(lambda: drawn(3.25, 1.0) == pytest.approx((255, 102, 255), abs=4))
+
+
+def test_topic_of_another_type_is_named(
+    controls: Any, robot: Robot, wait: Callable[..., None]
+) -> None:
+    robot.start()
+    node = controls.robot
+    node.create_publisher("/odd", "std_msgs/msg/String", QoS.latched()).publish(data="map")
+    view = controls.show('MapView { anchors.fill: parent; scans: ["/odd"] }')
+    wait(lambda: "the topic's type is std_msgs/msg/String" in view.property("status"))
+    wait(lambda: is_complete(view))
+
+
+def test_unknown_frame_is_named_and_another_one_shows_the_map(
+    controls: Any, robot: Robot, wait: Callable[..., None]
+) -> None:
+    robot.start()
+    view = controls.show('MapView { anchors.fill: parent; frame: "world" }')
+    wait(lambda: "no transform from map to world" in view.property("status"))
+    assert not view.property("scene").property("hasMap")
+    view.setProperty("frame", "base_link")
+    wait(lambda: view.property("scene").property("hasMap"))
+    box = view.property("scene").bounds()
+    assert (box.x(), box.y(), box.width(), box.height()) == pytest.approx((-2, 0, 6, 4))
+
+
+def test_robot_that_stops_sending_transforms_is_said(
+    controls: Any, wait: Callable[..., None]
+) -> None:
+    node = controls.robot
+    node.create_publisher("/map", GRID, QoS.latched()).publish(grid(np.zeros((40, 60))))
+    moving = node.create_publisher("/tf", "tf2_msgs/msg/TFMessage")
+    view = controls.show("MapView { anchors.fill: parent; follow: true; headingUp: true }")
+    scene, camera = view.property("scene"), view.property("camera")
+    wait(moving.subscription_count)
+    for number in range(3):
+        message = transform("map", "base_link", 1.0 + 0.5 * number, math.pi / 4)
+        message["header"]["stamp"] = {"sec": 100 + number}
+        moving.publish(transforms=[message])
+        wait(lambda x=1.0 + 0.5 * number: scene.property("robotX") == pytest.approx(x))
+    assert scene.property("driven") == pytest.approx(1.0)
+    wait(lambda: camera.centerX == pytest.approx(2.0))
+    assert camera.rotation == pytest.approx(math.pi / 4), "the robot heads up"
+    wait(lambda: "the robot's position is" in view.property("status"))
+    assert not scene.property("robotKnown")
+    assert view.property("stale")
+
+
+def test_map_of_a_publisher_that_is_gone_is_said(
+    controls: Any, robot: Robot, wait: Callable[..., None]
+) -> None:
+    robot.start()
+    view = controls.show("MapView { anchors.fill: parent }")
+    wait(lambda: is_complete(view))
+    robot.map.close()
+    wait(lambda: "/map: it has had no publisher since" in view.property("status"))
+    assert layer(view, "map").property("stale")
+    assert layer(view, "map").grid, "it is still shown, faded"
+
+
+def test_tiles_are_bounded_while_the_map_is_moved(
+    controls: Any, robot: Robot, wait: Callable[..., None]
+) -> None:
+    rng = np.random.default_rng(3)
+    robot.start(rng.integers(0, 100, (6000, 6000)))
+    view = controls.show("MapView { anchors.fill: parent }")
+    wait(lambda: is_complete(view))
+    camera, tiles = view.property("camera"), layer(view, "map").layer
+    assert len(tiles.model.rows) <= 4, "from far, a coarse level is enough"
+    camera.zoomBy(12.0, 200, 150)
+    for step in range(60):
+        camera.panBy(300 if step < 30 else -300, 100 if step % 2 else -140)
+        controls.grab()
+        assert len(tiles.model.rows) <= 24 + 40
+    wait(lambda: is_complete(view))
+    # Those of other levels are dropped, except the coarsest.
+    levels = {row.key.level for row in tiles.model.rows}
+    assert len(levels) == 2
+    assert len(tiles._images._images) == len(tiles.model.rows)
+
+
+def test_colors_follow_the_theme(controls: Any, robot: Robot, wait: Callable[..., None]) -> None:
+    robot.start()
+    view = controls.show(
+        "MapView { anchors.fill: parent; tools: false; property string mode: Theme.mode\n"
+        "onModeChanged: Theme.mode = mode }"
+    )
+    wait(lambda: is_complete(view))
+    wait(lambda: pixel(controls, view, 5.0, 3.5).lightness() < 60)
+    view.setProperty("mode", "bright")
+    try:
+        wait(lambda: pixel(controls, view, 5.0, 3.5).lightness() > 240)
+    finally:
+        view.setProperty("mode", "dark")
+
+
+def test_closing_while_tiles_are_made_leaves_nothing(
+    controls: Any, robot: Robot, wait: Callable[..., None]
+) -> None:
+    robot.start(np.zeros((3000, 3000)))
+    for _ in range(4):
+        view = controls.show("MapView { anchors.fill: parent }")
+        wait(lambda view=view: view.property("scene").property("hasMap"))
+        controls.window.deleteLater()
+        wait(lambda: robot.map.subscription_count() == 0)

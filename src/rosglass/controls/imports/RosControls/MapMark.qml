@@ -23,12 +23,17 @@ MapArrow {
     edgeColor: Theme.panel
     round: isDot
 
-    ThemeText {
+    Item {
         anchors.centerIn: parent
-        visible: mark.label !== ""
         rotation: -mark.rotation
-        text: mark.label
-        color: Theme.onAccent
-        font { pixelSize: Theme.small; weight: Font.Bold }
+
+        ThemeText {
+            x: mark.width / 2
+            y: -mark.height / 2 - height / 2
+            text: mark.label
+            font.weight: Font.Bold
+            style: Text.Outline
+            styleColor: Theme.panel
+        }
     }
 }

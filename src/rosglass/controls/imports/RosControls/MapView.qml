@@ -158,7 +158,12 @@ LiveFrame {
         Accessible.description: view.status || view.note
         onMoved: view.leave_()
         onPosed: function(x, y, yaw) { view.place_(x, y, yaw) }
-        onClicked: function(x, y) { view.clicked(x, y) }
+        onClicked: function(x, y) {
+            // What became of a goal has been read.
+            if (!goals_.active)
+                goals_.text = ""
+            view.clicked(x, y)
+        }
         onHomeKey: view.fit()
         onFollowKey: view.follow = !view.follow
         onEscapeKey: view.tool = ""
@@ -214,12 +219,13 @@ LiveFrame {
     }
     Flow {
         id: bar
-        visible: view.tools
+        visible: view.tools || goals_.active !== ""
         anchors { left: parent.left; right: parent.right; top: parent.top; margins: Theme.gap / 2 }
         spacing: Theme.gap / 2
 
-        MapButton { objectName: "fit"; text: qsTr("Fit"); onClicked: view.fit() }
+        MapButton { objectName: "fit"; visible: view.tools; text: qsTr("Fit"); onClicked: view.fit() }
         MapButton {
+            visible: view.tools
             text: qsTr("Follow")
             checkable: true
             checked: view.follow
@@ -227,6 +233,7 @@ LiveFrame {
         }
         MapButton {
             objectName: "goal"
+            visible: view.tools
             text: qsTr("Goal")
             checkable: true
             checked: view.tool === "goal"
@@ -234,6 +241,7 @@ LiveFrame {
         }
         MapButton {
             objectName: "waypoints"
+            visible: view.tools
             text: qsTr("Waypoints")
             checkable: true
             checked: view.tool === "waypoints"
@@ -248,10 +256,18 @@ LiveFrame {
         }
         MapButton {
             objectName: "pose"
+            visible: view.tools
             text: qsTr("Pose")
             checkable: true
             checked: view.tool === "pose"
             onClicked: view.tool = view.tool === "pose" ? "" : "pose"
+        }
+        MapButton {
+            id: layersButton
+            objectName: "layers"
+            visible: view.tools && scene_.layers.length > 1
+            text: qsTr("Layers")
+            checkable: true
         }
         MapButton {
             objectName: "cancel"
@@ -281,6 +297,49 @@ LiveFrame {
                 : goals_.text ? qsTr("Goal: %1").arg(goals_.text) : ""
             color: !view.tool && goals_.bad ? Theme.bad : Theme.text
             font.pixelSize: Theme.small
+        }
+    }
+    Rectangle {
+        anchors { right: parent.right; top: bar.visible ? bar.bottom : parent.top; topMargin: Theme.gap / 2; rightMargin: Theme.gap / 2 }
+        visible: layersButton.visible && layersButton.checked
+        width: Math.min(260 * Theme.size, plane.width - Theme.gap)
+        height: Math.min(list.contentHeight + Theme.gap, plane.height - y - Theme.gap)
+        radius: Theme.radius / 2
+        color: Theme.shade
+
+        ListView {
+            id: list
+            objectName: "list"
+            anchors { fill: parent; margins: Theme.gap / 2 }
+            clip: true
+            model: scene_.layers
+            delegate: Column {
+                width: list.width
+
+                ThemeSwitch {
+                    width: parent.width
+                    text: modelData.topic
+                    checked: modelData.shown
+                    onClicked: modelData.shown = checked
+                }
+                ThemeText {
+                    width: parent.width
+                    visible: text !== ""
+                    text: modelData.shown ? modelData.status : ""
+                    color: modelData.stale ? Theme.bad : Theme.warn
+                    font.pixelSize: Theme.small
+                    wrapMode: Text.Wrap
+                    maximumLineCount: 3
+                }
+            }
+            footer: ThemeText {
+                width: list.width
+                visible: scene_.more > 0
+                height: visible ? implicitHeight : 0
+                text: qsTr("%1 more topics; name those to show").arg(scene_.more)
+                color: Theme.dim
+                font.pixelSize: Theme.small
+            }
         }
     }
 }
