@@ -100,6 +100,7 @@ class TopicRecorder(Element):
         self._active = False
         self._path: str
         self._ticks = self._unfinished = 0
+        self._looking = False
         self._reason = ""
 
     def _get_topics(self) -> QJSValue:
@@ -107,7 +108,8 @@ class TopicRecorder(Element):
         return QJSValue() if runtime is None else runtime.value(list(self._topics))
 
     def _folder_path(self) -> Path:
-        return Path(plain_path(self.folder)) if self.folder else Path.home()
+        # Unlike pathlib's, this never raises.
+        return Path(os.path.expanduser(plain_path(self.folder) or "~")).absolute()  # noqa: PTH111
 
     # Starting and stopping.
 
@@ -285,21 +287,26 @@ class TopicRecorder(Element):
             self._end()
 
     def _look_at_disk(self) -> None:
+        """Find out how much is free, in a thread of its own: a lost network disk may block it."""
         session = self._session
-        if session is None:
+        if session is None or self._looking:
             return
-        folder, show = self._folder_path(), weak_callback(self._show_free)
+        self._looking = True
+        folder, post = self._folder_path(), session.executor.post
+        show = weak_callback(self._show_free)
 
-        def look() -> float:
+        def look() -> None:
             try:
-                return float(shutil.disk_usage(os.fspath(folder)).free)
+                free = float(shutil.disk_usage(folder).free)
             except OSError:
-                return -1.0
+                free = -1.0
+            post(lambda: show(free))
 
-        session.background(look, show)
+        threading.Thread(target=look, name="free disk space", daemon=True).start()
 
-    def _show_free(self, free: float | Error) -> None:
-        if is_alive(self) and not isinstance(free, Error):
+    def _show_free(self, free: float) -> None:
+        self._looking = False
+        if is_alive(self):
             report(self, free=free)
 
 

@@ -334,6 +334,26 @@ def test_timeline_is_dragged(timeline: Any, wait: Any) -> None:
     assert bench.find("time").property("text").endswith("/ 00:10.0")
 
 
+def test_timeline_controls_a_replay_of_the_interface(
+    timeline: Any, recording: Path, wait: Any
+) -> None:
+    bench, _ = timeline
+    control = bench.show(
+        f"""Item {{
+            property alias line: line
+            Replay {{ id: other; file: "{recording}"; playing: false }}
+            Timeline {{ id: line; objectName: "line"; replay: other; width: 300; height: 120 }}
+        }}"""
+    )
+    line = bench.find("line", control)
+    wait(lambda: line.property("ready"))
+    line.pause()
+    line.seek(99)
+    at(line, wait, 10)
+    line.seek(-1)
+    at(line, wait, 0)
+
+
 def test_timeline_without_a_recording_says_so(controls: Any) -> None:
     control = controls.show("Timeline { anchors.fill: parent }")
     assert control.property("note") == "no recording is shown"
