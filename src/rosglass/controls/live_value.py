@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.controls.live_topic import LiveTopic
 from rosglass.errors import FieldPathError
-from rosglass.messages import Message
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
 from rosglass.qt import Slot
 
@@ -24,6 +23,9 @@ def number_of(value: Any, path: str) -> float:
     Raises:
         FieldPathError: It is not a single number.
     """
+    # Slow to import, and there is a message when it is needed.
+    from rosglass.messages import Message  # noqa: PLC0415
+
     if isinstance(value, Message):
         seconds = getattr(value, "seconds", None)
         if isinstance(seconds, float):

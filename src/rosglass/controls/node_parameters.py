@@ -139,7 +139,8 @@ _ROLES: dict[str, Callable[[_Row], Any]] = {
     "changed": lambda row: row.value != row.first,
     "external": lambda row: row.is_marked,
 }
-_FIRST_ROLE = int(QtCore.Qt.ItemDataRole.UserRole) + 1
+#: Qt.UserRole + 1, as a number: PySide creates all of Qt's enumerations at the first that is used.
+_FIRST_ROLE = 0x0101
 _NUMBERS = {_FIRST_ROLE + at: name for at, name in enumerate(_ROLES)}
 
 
