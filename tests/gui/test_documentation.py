@@ -57,6 +57,8 @@ def as_file(page: str, snippet: str) -> str:
     if re.match(r"on[A-Z]\w*: ", body):
         body = f'Subscription {{ topic: "/scan"; function draw(x) {{}}\n{body} }}'
     given = GIVEN.get(page, "")
+    if (DOCS / "controls" / page).exists():
+        imports = [*imports, "import RosControls 1.0"]
     if "SceneView" in body:
         given = ""
     elif page == "scene.md" and re.search(r"Display|^Tool \{", body, re.MULTILINE):
