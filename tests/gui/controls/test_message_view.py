@@ -84,13 +84,8 @@ def test_a_number_is_dragged_onto_a_plot(controls: Any, wait: Any) -> None:
     publisher = controls.robot.create_publisher("/x", "std_msgs/msg/Float64")
     controls.show(
         """Item { anchors.fill: parent
-            property string dropped
             MessageView { topic: "/x"; width: parent.width; height: 150 }
-            DropArea {
-                objectName: "plot"; y: 160; width: parent.width; height: 100
-                keys: ["rosglass/path"]
-                onDropped: function(drop) { parent.dropped = drop.source.path }
-            }
+            Plot { objectName: "plot"; y: 160; width: parent.width; height: 140 }
         }"""
     )
     wait(publisher.subscription_count)
@@ -98,7 +93,7 @@ def test_a_number_is_dragged_onto_a_plot(controls: Any, wait: Any) -> None:
     wait(lambda: rows(controls, "key") == ["data"])
     wait.signals(controls.window.frameSwapped)
     drag(controls, controls.find("hand"), controls.find("plot"))
-    wait(lambda: controls.window.property("control").property("dropped") == "/x:data")
+    wait(lambda: controls.find("plot").property("paths").toVariant() == ["/x:data"])
     # Back in its row.
     wait(lambda: controls.find("dragged", controls.find("tree")).x() == 0)
 
