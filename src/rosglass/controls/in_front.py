@@ -40,7 +40,7 @@ class FocusWatch(QtCore.QAbstractNativeEventFilter):
             return
         if not self._window:
             QtCore.QCoreApplication.instance().installNativeEventFilter(self)
-        self._window = int(_outermost(focus).winId())
+        self._window = int(focus.winId())
 
     def stop(self) -> None:
         """Stop watching; safe to call twice, but not from `on_lost`."""
@@ -99,9 +99,19 @@ def obstruction(item: QtQuick.QQuickItem | QtGui.QWindow | None) -> str:
         return "the window is not visible"
     focus = QtGui.QGuiApplication.focusWindow()
     # Not isActive(), which is also true behind a dialog of the window.
-    if focus is None or address(_outermost(focus)) != address(_outermost(window)):
+    if focus is None or not (_contains(focus, window) or _contains(window, focus)):
         return "the window is not in front"
     return ""
+
+
+def _contains(outer: Any, inner: Any) -> bool:
+    """Return whether a window is another one, or around it.
+
+    Not by their parent(): PySide 2 takes a window without a parent for its own, and deletes it.
+    """
+    if address(outer) == address(inner):
+        return True
+    return bool(outer.isAncestorOf(inner, QtGui.QWindow.AncestorMode.ExcludeTransients))
 
 
 def _is_outside(item: QtQuick.QQuickItem, window: QtQuick.QQuickWindow) -> bool:
@@ -118,13 +128,8 @@ def _has_modal_popup(window: Any) -> bool:
         if not item.metaObject().className().startswith("QQuickOverlay") or not item.isVisible():
             continue
         for shown in item.childItems():
-            popup = shown.parent()
-            if popup is not None and popup.property("modal") and popup.property("visible"):
-                return True
+            if shown.metaObject().className() == "QQuickPopupItem":
+                popup = shown.parent()
+                if popup.property("modal") and popup.property("visible"):
+                    return True
     return False
-
-
-def _outermost(window: Any) -> Any:
-    while (above := window.parent()) is not None and isinstance(above, QtGui.QWindow):
-        window = above
-    return window
