@@ -191,8 +191,14 @@ class Screen:
         self.x11("mouseup 1; keyup w; mousemove", *_STICK)
         since = len(self.lines)
         self.ask("reset()")
-        self.x11("search --name teleoperation windowfocus")
-        self._wait_until_ready(since)
+
+        def is_ready() -> bool:
+            # One of its own, which ends if the window is one that is just being destroyed.
+            command = ["xdotool", "search", "--name", "teleoperation", "windowfocus"]
+            subprocess.run(command, env=self._env, capture_output=True, check=False)
+            return "READY" in self.lines[since:]
+
+        eventually(is_ready, lambda: self.text, timeout=60)
 
     @property
     def text(self) -> str:

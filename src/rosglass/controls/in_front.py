@@ -12,7 +12,7 @@ from rosglass.qt import QtCore, QtGui, QtQuick, address
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["FocusWatch", "find_item", "obstruction"]
+__all__ = ["FocusWatch", "find_item", "obstruction", "popup_layer"]
 
 #: X11's FocusOut events: the type, the modes in which the focus really moves (NotifyNormal and
 #: NotifyWhileGrabbed), and the details by which it stays in the window (NotifyInferior), or is not
@@ -124,12 +124,17 @@ def _is_outside(item: QtQuick.QQuickItem, window: QtQuick.QQuickWindow) -> bool:
 
 def _has_modal_popup(window: Any) -> bool:
     """Return whether a modal popup of Qt Quick is open in a window."""
-    for item in window.contentItem().childItems():
-        if not item.metaObject().className().startswith("QQuickOverlay") or not item.isVisible():
-            continue
-        for shown in item.childItems():
-            if shown.metaObject().className() == "QQuickPopupItem":
-                popup = shown.parent()
-                if popup.property("modal") and popup.property("visible"):
-                    return True
+    overlay = popup_layer(window)
+    for shown in overlay.childItems() if overlay is not None and overlay.isVisible() else ():
+        is_popup = shown.isVisible() and shown.metaObject().className() == "QQuickPopupItem"
+        if is_popup and shown.parent().property("modal"):
+            return True
     return False
+
+
+def popup_layer(window: Any) -> Any:
+    """Return the item of a window that holds its open popups; None while there are no popups."""
+    for item in window.contentItem().childItems():
+        if item.metaObject().className().startswith("QQuickOverlay"):
+            return item
+    return None

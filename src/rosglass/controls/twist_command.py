@@ -10,7 +10,7 @@ from weakref import ref
 
 from rosglass.comm.qos import QoS
 from rosglass.controls.command_sender import CommandSender, Limits, Velocity
-from rosglass.controls.in_front import FocusWatch, find_item, obstruction
+from rosglass.controls.in_front import FocusWatch, find_item, obstruction, popup_layer
 from rosglass.errors import Error, UnsupportedError
 from rosglass.interfaces.names import join_name
 from rosglass.qml.elements.element import Element
@@ -240,6 +240,9 @@ class TwistCommand(Element):
             one.window = window
             window.visibleChanged.connect(self._check)
             window.windowStateChanged.connect(self._check)
+            layer = popup_layer(window) if isinstance(window, QtQuick.QQuickWindow) else None
+            if layer is not None:
+                layer.visibleChanged.connect(self._check)
 
     def _let_go(self) -> None:
         self._steers = None
