@@ -95,9 +95,10 @@ def in_front(controls: Any, wait: Any) -> None:
 def show_drive(controls: Any, wait: Any) -> tuple[Any, Any]:
     root = controls.show(DRIVE)
     in_front(controls, wait)
-    pad, drive = root.property("pad"), root.property("drive")
+    pad = root.property("pad")
     wait(lambda: pad.property("connected"))
-    wait(lambda: drive.property("problem") == "")
+    # What steers before there is a topic has to be let go first.
+    wait(controls.keep.publisher_count)
     return root, pad
 
 
@@ -312,10 +313,28 @@ def test_the_gamepad_is_chosen_by_name_or_number(controls: Any, wait: Any, plug:
     wait(lambda: not pad.property("connected"))
 
 
+def test_the_view_says_why_what_is_held_does_not_steer(
+    controls: Any, wait: Any, plug: Any, twists: Any
+) -> None:
+    pad = plug()
+    view = controls.show(
+        """GamepadView { anchors.fill: parent; gamepad: padId
+        TwistCommand { id: driveId; obstacle: "emergency stop" }
+        Gamepad { id: padId; command: driveId } }"""
+    )
+    in_front(controls, wait)
+    wait(lambda: view.property("status") == "")
+    assert controls.find("state").property("text") == "hold leftshoulder to steer"
+    pad.button(LEFT_SHOULDER)
+    wait(lambda: "does not steer: emergency stop" in controls.find("state").property("text"))
+    assert twists == []
+
+
 def test_a_missing_control_is_named(controls: Any, wait: Any, plug: Any, twists: Any) -> None:
     pad = plug("Old Stick", axes=2, buttons=3, type=0)
     root = controls.show(DRIVE)
     in_front(controls, wait)
+    wait(controls.keep.publisher_count)
     element = root.property("pad")
     wait(lambda: 'Old Stick has no control "b" (Gamepad.stopButton)' in element.property("problem"))
     assert "a0 to a1, b0 to b2" in element.property("problem")

@@ -11,6 +11,8 @@ LiveFrame {
     readonly property var axes_: gamepad ? gamepad.axes : []
     readonly property var buttons_: gamepad ? gamepad.buttons : []
     readonly property var devices_: gamepad ? gamepad.devices : []
+    // Why what is held does not move the robot.
+    readonly property string refused_: gamepad && gamepad.command && gamepad.held ? gamepad.command.problem : ""
     readonly property bool connected_: gamepad !== null && gamepad.connected
 
     title: qsTr("Gamepad")
@@ -35,10 +37,10 @@ LiveFrame {
             visible: view.connected_
             text: !view.connected_ ? ""
                 : view.gamepad.obstacle ? qsTr("does not count: %1").arg(view.gamepad.obstacle)
-                : view.gamepad.held ? qsTr("steers")
+                : view.gamepad.held ? (view.refused_ ? qsTr("does not steer: %1").arg(view.refused_) : qsTr("steers"))
                 : view.gamepad.deadMan ? qsTr("hold %1 to steer").arg(view.gamepad.deadMan)
                 : qsTr("let go")
-            color: view.connected_ && view.gamepad.held ? Theme.accent : Theme.dim
+            color: !view.connected_ || !view.gamepad.held ? Theme.dim : view.refused_ ? Theme.bad : Theme.accent
             font.pixelSize: Theme.small
         }
         Flow {
