@@ -255,6 +255,8 @@ LiveFrame {
                     cursorShape: Qt.OpenHandCursor
                     drag.target: dragged
                     drag.threshold: 4
+                    // What is under the pointer is where it is dropped, however it got there.
+                    drag.smoothed: false
                     onReleased: {
                         dragged.Drag.drop()
                         dragged.x = 0
