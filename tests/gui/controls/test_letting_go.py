@@ -6,10 +6,14 @@ import shutil
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from ports import free_port
+from relay import Relay
+from waiting import eventually, nothing_happens
 
 import rosglass
-from letting_go import WAYS, Robot, Screen, let_go, stays_connected
+from letting_go import WAYS, Robot, Screen, drag, let_go, stays_connected
 from rosglass.qt import QT6
+from rosglass.wires.zenoh.router import Router
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -75,3 +79,33 @@ def test_letting_go(name: str, screens: Any, robot: Robot) -> None:
     assert "internal error" not in text
     if way.ends:
         screens.close()
+
+
+@pytest.mark.skipif(not QT6, reason="the wire, not Qt, is what matters")
+@pytest.mark.parametrize("outage_s", [0.5, 3.0])
+def test_letting_go_during_an_outage(outage_s: float, screen: str, tmp_path: Path) -> None:
+    """The link stalls, and delivers later what was sent: the last of it is a zero."""
+    port = free_port()
+    with Router(f"tcp/127.0.0.1:{port}") as router, Relay(port) as relay, stays_connected(screen):
+        node = rosglass.connect(router.url, "robot")
+        robot = Robot(node)
+        program = Screen(f"zenoh://127.0.0.1:{relay.port}?mode=client", screen, tmp_path)
+        try:
+            program.reset()
+            drag(program)
+            eventually(lambda: robot.moves)
+            relay.stall()
+            nothing_happens(0.1)
+            program.x11("mouseup", 1)
+            nothing_happens(outage_s)
+            robot.received.clear()
+            relay.resume()
+            eventually(lambda: robot.zeros >= 3)
+            nothing_happens(1.5)
+            assert robot.zeros >= 3
+            moving = sum(speed > 0 for _, speed in robot.received)
+            assert moving < 15, "what was sent before the outage was noticed; 20 a second"
+        finally:
+            relay.resume()
+            program.close()
+            node.close()
