@@ -55,6 +55,21 @@ def test_goal_is_canceled(controls: Any, counter: Any, wait: Any) -> None:
     assert controls.find("state").property("text") == "CANCELLED"
 
 
+def test_goal_without_news_says_so(controls: Any, counter: Any, wait: Any) -> None:
+    counter.offer()
+    counter.stop.clear()
+    panel = controls.show('ActionPanel { action: "/count"; goal: ({order: 50}) }')
+    wait(lambda: panel.property("ready"))
+    panel.send(None)
+    wait(lambda: panel.property("feedback"))
+    panel.cancel()
+    wait(lambda: "last feedback" in controls.find("state").property("text"))
+    assert panel.property("outcome") == "canceling"
+    counter.stop.set()
+    wait(lambda: panel.property("outcome") == "canceled")
+    assert controls.find("state").property("text") == "CANCELLED"
+
+
 def test_form_has_the_fields_of_the_goal(controls: Any, counter: Any, wait: Any) -> None:
     counter.offer()
     panel = controls.show('ActionPanel { action: "/count" }')

@@ -69,6 +69,18 @@ def test_server_that_never_answers_is_given_up(controls: Any, wait: Any) -> None
     go.set()
 
 
+def test_server_that_leaves_before_it_answers(controls: Any, wait: Any) -> None:
+    go = threading.Event()
+    server = controls.robot.create_service_server("/slow", TRIGGER, lambda _: go.wait(30) and None)
+    button = controls.show('ServiceButton { service: "/slow" }')
+    wait(lambda: button.property("ready"))
+    button.call()
+    threading.Thread(target=server.close).start()
+    wait(lambda: not button.property("ready") and not button.property("busy"))
+    assert button.property("status").startswith("FAILED")
+    go.set()
+
+
 def test_service_of_an_unknown_type_is_named(controls: Any, wait: Any) -> None:
     button = controls.show('ServiceButton { service: "/x"; type: "nowhere/srv/Nothing" }')
     wait(lambda: "nowhere/srv/Nothing" in button.property("status"))

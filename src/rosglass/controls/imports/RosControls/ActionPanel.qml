@@ -33,7 +33,8 @@ LiveFrame {
     // "", "sent", "running", "canceling", "succeeded", "canceled", "refused", "aborted" or "unknown".
     readonly property string outcome: outcome_
     // What is shown of the goal.
-    readonly property string state_: outcome_ === "" ? (ready ? qsTr("ready") : "")
+    readonly property string state_: active && !ready ? qsTr("NO CONTACT: it may still be running")
+        : outcome_ === "" ? (ready ? qsTr("ready") : "")
         : outcome_ === "sent" ? qsTr("sent, not accepted yet")
         : outcome_ === "running" ? qsTr("running")
         : outcome_ === "canceling" ? qsTr("canceling ...")
@@ -67,6 +68,9 @@ LiveFrame {
     property var result_
     property real elapsed_: 0
     property double sentAt_: 0
+    // Seconds since the last feedback.
+    property double fedAt_: 0
+    property real silence_: 0
     // The form: [{path, kind, text}], how many more fields the goal has, and what is wrong with it.
     property var entries_: []
     property int left_: 0
@@ -102,7 +106,8 @@ LiveFrame {
         furthest_ = elapsed_ = 0
         percent_ = false
         feedback_ = result_ = undefined
-        sentAt_ = Date.now()
+        sentAt_ = fedAt_ = Date.now()
+        silence_ = 0
         client_.connectionTimeout = Math.round(1000 * (timeout > 0 && timeout < 86400 ? timeout : 10))
         const mine = () => self && number === self.number_
         let rejected = false
@@ -140,6 +145,8 @@ LiveFrame {
 
     function take_(message) {
         feedback_ = message
+        fedAt_ = Date.now()
+        silence_ = 0
         said_ = describe_(message)
         let value = NaN
         try {
@@ -283,7 +290,11 @@ LiveFrame {
         interval: 200
         repeat: true
         running: panel.active
-        onTriggered: panel.elapsed_ = Math.max(panel.elapsed_, (Date.now() - panel.sentAt_) / 1000)
+        // They grow even when the clock is set back.
+        onTriggered: {
+            panel.elapsed_ = Math.max(panel.elapsed_, (Date.now() - panel.sentAt_) / 1000)
+            panel.silence_ = Math.max(panel.silence_, (Date.now() - panel.fedAt_) / 1000)
+        }
     }
 
     Flickable {
@@ -392,9 +403,17 @@ LiveFrame {
                 objectName: "state"
                 width: parent.width
                 visible: text !== ""
-                text: panel.cancelProblem_ || panel.formProblem_ || (panel.state_ && !isNaN(panel.progress) && panel.active
-                      ? qsTr("%1, %2 %").arg(panel.state_).arg((100 * panel.progress).toFixed(0)) : panel.state_)
-                color: panel.cancelProblem_ || panel.formProblem_ ? Theme.bad
+                text: {
+                    if (panel.cancelProblem_ || panel.formProblem_)
+                        return panel.cancelProblem_ || panel.formProblem_
+                    const parts = [panel.state_]
+                    if (panel.active && panel.ready && !isNaN(panel.progress))
+                        parts.push(qsTr("%1 %").arg((100 * panel.progress).toFixed(0)))
+                    if (panel.active && panel.feedback !== undefined && panel.silence_ > 3)
+                        parts.push(qsTr("last feedback %1 s ago").arg(panel.silence_.toFixed(0)))
+                    return parts.filter(part => part !== "").join(", ")
+                }
+                color: panel.cancelProblem_ || panel.formProblem_ || (panel.active && !panel.ready) ? Theme.bad
                     : panel.outcome === "succeeded" ? Theme.good
                     : panel.outcome === "refused" || panel.outcome === "aborted" || panel.outcome === "unknown" ? Theme.bad
                     : panel.outcome === "canceled" || panel.outcome === "canceling" ? Theme.warn : Theme.dim

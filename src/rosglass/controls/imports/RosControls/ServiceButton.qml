@@ -32,9 +32,10 @@ Item {
     // What is shown below the button.
     readonly property string status: wrong_ ? wrong_
         : busy ? (ready ? qsTr("calling ...") : qsTr("waiting for %1 ...").arg(name_))
+        // Also without a server: the robot may have done it before its answer was lost.
+        : outcome_ === "failed" ? qsTr("FAILED: %1").arg(said_)
         : !ready ? qsTr("NOT AVAILABLE: %1").arg(client_ && client_.problem ? Fields.bounded(client_.problem) : qsTr("no server of %1 yet").arg(name_))
         : outcome_ === "refused" ? qsTr("REFUSED: %1").arg(said_)
-        : outcome_ === "failed" ? qsTr("FAILED: %1").arg(said_)
         : outcome_ === "done" ? (said_ ? qsTr("done: %1").arg(said_) : qsTr("done"))
         : ""
     // The last response; undefined without one.
