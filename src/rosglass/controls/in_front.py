@@ -38,8 +38,9 @@ class FocusWatch(QtCore.QAbstractNativeEventFilter):
         focus = QtGui.QGuiApplication.focusWindow()
         if focus is None or QtGui.QGuiApplication.platformName() != "xcb":
             return
-        if not self._window:
-            QtCore.QCoreApplication.instance().installNativeEventFilter(self)
+        app = QtCore.QCoreApplication.instance()
+        if not self._window and app is not None:
+            app.installNativeEventFilter(self)
         self._window = int(focus.winId())
 
     def stop(self) -> None:
