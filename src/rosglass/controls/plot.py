@@ -230,7 +230,8 @@ class PlotData(Element):
         self._frame: PlotFrame = plot_frame.PlotFrame()
         self._view: Any = None
         self._end_ns = 0
-        self._url = ""
+        #: URL of the robot whose samples are kept.
+        self._url: str | None = None
         self._legend: list[dict[str, Any]] = []
         self._readings: list[str] = []
         self._ticks: list[list[dict[str, Any]]] = [[], []]
@@ -278,7 +279,7 @@ class PlotData(Element):
 
     def _on_created(self, endpoint: PlotReceiver) -> None:
         url = self._session.url if self._session is not None else ""
-        if self._url and url != self._url:
+        if self._url is not None and url != self._url:
             # Another robot, whose values must not be taken for those of the one before.
             for feed in self._feeds.values():
                 feed.clear()
@@ -287,6 +288,8 @@ class PlotData(Element):
             feed.arrived = None
         self._receiver = endpoint
         self._sync()
+        self._update_readings()
+        self._update_stale()
 
     def _on_closed(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
         self._receiver = None

@@ -216,6 +216,7 @@ class TopicFeed:
         self.fields: tuple[FieldFeed, ...] = ()
         self.use_stamps, self.history_ns = True, 0
         self.subscription: Subscription | None = None
+        self._node: Node | None = None
         self.problem = self._time_problem = ""
         self.received = self.malformed = self.offset_ns = 0
         self.arrived: float | None = None
@@ -243,8 +244,10 @@ class TopicFeed:
 
     def subscribe(self, node: Node) -> None:
         """Subscribe, unless that has been done."""
-        if self.subscription is not None:
+        if self.subscription is not None and self._node is node:
             return
+        self.unsubscribe(self._node)
+        self._node = node
         try:
             self.subscription = node.create_subscription(self.topic, None, qos=_QOS)
             self.subscription.set_inbox_limit(_MAX_WAITING_BYTES)
@@ -252,8 +255,10 @@ class TopicFeed:
         except Error as error:
             self.problem = str(error)
 
-    def unsubscribe(self) -> None:
-        """Close the subscription; the samples stay."""
+    def unsubscribe(self, node: Node | None) -> None:
+        """Close the subscription, if it is one of a node; the samples stay."""
+        if node is not self._node:
+            return  # a new node has subscribed before the end of this one
         subscription, self.subscription = self.subscription, None
         if subscription is not None:
             subscription.close()
@@ -266,11 +271,12 @@ class TopicFeed:
         samples = subscription.take_all()
         if not samples:
             return
-        self.received += len(samples)
-        self.arrived = now
         fields = self.fields
         for (kind, wire), group in groupby(samples, _type_and_wire):
             self._read(kind, wire, fields, list(group))
+        # Not before: those that are counted can be read.
+        self.received += len(samples)
+        self.arrived = now
         self.problem = self._time_problem
 
     def _read(
@@ -491,7 +497,7 @@ class PlotReceiver:
         ):
             return
         for topic in self._open.keys() - feeds.keys():
-            self._open.pop(topic).unsubscribe()
+            self._open.pop(topic).unsubscribe(self._node)
         for topic, feed in feeds.items():
             self._open[topic] = feed
             feed.subscribe(self._node)

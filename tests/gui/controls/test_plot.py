@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import time
 from typing import Any
 
 import pytest
@@ -378,3 +379,109 @@ def test_declared_series_has_value_and_unit(controls: Any, plot: Any, wait: Any)
     wait(lambda: shown.readings() == ["0.25"])
     (line,) = shown.get("legend")
     assert (line["name"], line["unit"]) == ("<b>a</b>", "rad")
+
+
+def test_plot_over_a_middleware(live: Any, wait: Any) -> None:
+    """Stamps of either ROS version, and times of reception that are apart as the messages are."""
+    from rosglass.controls import register
+
+    register()
+    stamps = live.robot.create_publisher("/point", POINT)
+    plain = live.robot.create_publisher("/value", NUMBER)
+    window: Any = live.load(
+        'Window { visible: true; Plot { window: 10; paths: ["/point:point.x", "/value:data"] } }',
+        "import QtQuick 2.15\nimport QtQuick.Window 2.15\nimport RosControls 1.0",
+    )
+    data = window.findChild(_qt().QObject, "plotData")
+    wait(lambda: stamps.subscription_count() and plain.subscription_count())
+    ros1 = live.robot.url.startswith("ros1")
+    begin = time.time()
+    for number in range(200):
+        whole, part = divmod(time.time_ns(), 1_000_000_000)
+        stamp = {"secs": whole, "nsecs": part} if ros1 else {"sec": whole, "nanosec": part}
+        stamps.publish(header={"stamp": stamp}, point={"x": number})
+        plain.publish(data=number)
+        wait.nothing_happens(0.005)
+    end = time.time()
+    wait(lambda: data.property("received") == 400)
+    assert data.property("lost") == 0
+    wait(lambda: list(data.property("readings")) == ["199", "199"])
+    for line in data.property("legend"):
+        assert line["problem"] == ""
+    data.setProperty("paused", True)
+    # Halfway between first and last message is the middle one, by either kind of time.
+    window_s, right = data.property("window"), data.property("end")
+    middle = 1 - (right - (begin + end) / 2) / window_s
+    values = [float(text) for text in data.valuesAt(middle)["values"]]
+    assert values == pytest.approx([100, 100], abs=40)
+
+
+def test_dropped_field_is_plotted(controls: Any, wait: Any) -> None:
+    controls.show(
+        """Item { width: 600; height: 400
+            Plot { objectName: "plot"; anchors.fill: parent }
+            Item { objectName: "field"; property string path: "/point:point.x"
+                width: 10; height: 10
+                property bool held: false
+                property bool dropped: false
+                Drag.keys: ["rosglass/path"]
+                Drag.active: held
+                onDroppedChanged: Drag.drop() } }""",
+        600,
+        400,
+    )
+    field, data = controls.find("field"), controls.window.findChild(_qt().QObject, "plotData")
+    field.setProperty("held", True)
+    field.setX(300)
+    field.setY(200)
+    wait.nothing_happens(0.1)
+    field.setProperty("dropped", True)
+    wait(lambda: [line["path"] for line in data.property("legend")] == ["/point:point.x"])
+
+
+def test_image_is_written(controls: Any, plot: Any, wait: Any, tmp_path: Any) -> None:
+    shown = plot(
+        """Plot { property string target; property var outcomes: []
+            onTargetChanged: savePng(target)
+            onSaved: function(file, problem) { outcomes = outcomes.concat([problem]) } }"""
+    )
+    outcomes = lambda: _plain(shown.item.property("outcomes"))  # noqa: E731 - looked at twice
+    shown.item.setProperty("target", str(tmp_path / "plot.png"))
+    wait(lambda: outcomes() == [""])
+    assert (tmp_path / "plot.png").read_bytes().startswith(b"\x89PNG")
+    shown.item.setProperty("target", str(tmp_path / "none/plot.png"))
+    wait(lambda: len(outcomes()) == 2)
+    assert "none/plot.png could not be written" in outcomes()[1]
+
+
+def _plain(value: Any) -> Any:
+    return value.toVariant() if hasattr(value, "toVariant") else value
+
+
+def test_plots_come_and_go_while_messages_arrive(controls: Any, wait: Any) -> None:
+    publisher = controls.robot.create_publisher("/value", NUMBER)
+    controls.show(
+        'Loader { objectName: "loader"; sourceComponent: Plot { width: 300; height: 200\n'
+        'paths: ["/value:data"] } }'
+    )
+    loader = controls.find("loader")
+    for turn in range(6):
+        loader.setProperty("active", True)
+        wait(publisher.subscription_count)
+        for number in range(50):
+            publisher.publish(data=number)
+        if turn % 2:
+            wait.nothing_happens(0.05)
+        loader.setProperty("active", False)
+        wait(lambda: publisher.subscription_count() == 0)
+
+
+def test_samples_of_another_robot_are_dropped(controls: Any, plot: Any, wait: Any) -> None:
+    publisher = controls.robot.create_publisher("/value", NUMBER)
+    shown = plot('Plot { paths: ["/value:data"] }')
+    wait(publisher.subscription_count)
+    publisher.publish(data=1.0)
+    wait(lambda: shown.readings() == ["1"])
+    controls.engine_session.url = "memory://other"
+    wait(lambda: shown.readings() == [""])
+    assert shown.item.property("stale")
