@@ -22,8 +22,8 @@ OK, WARN, ERROR, STALE = range(4)
 RANK = (0, 1, 3, 2)
 #: Parts that are kept; further ones are counted.
 _MAX_PARTS = 5000
-#: Keys and values of a part that are kept; further ones are counted.
-_MAX_VALUES = 200
+#: Keys and values that are kept, of a part and of a message; further ones are counted.
+_MAX_VALUES, _MAX_MESSAGE_VALUES = 200, 10_000
 
 
 class DiagnosticsTopic(MergedTopic):
@@ -57,8 +57,10 @@ class DiagnosticsTopic(MergedTopic):
         self._types = ["diagnostic_msgs/msg/DiagnosticArray"]
 
     def _merge(self, message: Message, now: float) -> None:
-        rows, refused = self._rows, 0
-        for status in message.status:
+        rows, room = self._rows, _MAX_MESSAGE_VALUES
+        # Beyond that, most would be the same parts again.
+        refused = max(0, len(message.status) - _MAX_PARTS)
+        for status in message.status[:_MAX_PARTS] if refused else message.status:
             key = (status.name, status.hardware_id)
             row = rows.get(key)
             if row is None:
@@ -76,12 +78,13 @@ class DiagnosticsTopic(MergedTopic):
             text = bounded(status.message, 2000, lines=True)
             if not OK <= level <= STALE:
                 text, level = f"level {level}: {text}", ERROR
-            values = status.values
-            row["said"], row["text"], row["at"] = level, text, now
-            row["more"] = max(0, len(values) - _MAX_VALUES)
+            values, row["said"], row["text"], row["at"] = status.values, level, text, now
+            kept = min(len(values), _MAX_VALUES, room)
+            row["more"] = len(values) - kept
+            room -= kept
             row["values"] = [
                 {"key": bounded(pair.key, 200), "value": bounded(pair.value, 2000, lines=True)}
-                for pair in (values[:_MAX_VALUES] if row["more"] else values)
+                for pair in (values[:kept] if row["more"] else values)
             ]
         if refused:
             report(self, uncounted=self._uncounted + refused)

@@ -15,8 +15,6 @@ from rosglass.qml.engine.properties import ReadOnly, Writable, one_of, report, w
 from rosglass.qt import is_alive
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rosglass.messages import Message
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
@@ -46,7 +44,8 @@ class JointTopic(MergedTopic):
         "name", "type", "position", "velocity", "effort", "lower", "upper", "share", "nearness",
         "maxEffort", "maxVelocity", "fault", "silent",
     )  # fmt: skip
-    _DEFAULT_QOS = QoS(depth=20)
+    # Not fewer: a slow publisher beside a fast one must not seem silent.
+    _DEFAULT_QOS = QoS(depth=100)
 
     #: The robot's description, URDF; empty to look for the parameter robot_description in ROS 1.
     description = Writable(str, "", then="_read_limits")
@@ -76,6 +75,8 @@ class JointTopic(MergedTopic):
         self._order_now: list[str] = []
         self._sorted_at = self._looked_at = -math.inf
         self._count = 0
+        #: The newest messages that are not in the rows yet, by the names of their joints.
+        self._newest: dict[tuple[str, ...], tuple[Message, float]] = {}
 
     # Limits.
 
@@ -125,20 +126,28 @@ class JointTopic(MergedTopic):
     # Joints.
 
     def _merge(self, message: Message, now: float) -> None:
-        names = message.name
+        self._newest[tuple(message.name)] = (message, now)
+
+    def _arrange(self) -> None:
+        newest, self._newest = self._newest, {}
+        for names, (message, at) in newest.items():
+            self._take(names, message, at)
+        super()._arrange()
+
+    def _take(self, names: tuple[str, ...], message: Message, now: float) -> None:
         columns = [message.position, message.velocity, message.effort]
         fault = ""
         for what, column in zip(("position", "velocity", "effort"), columns, strict=True):
             if len(column) not in {0, len(names)}:
                 fault = f"{what} has {len(column)} values for {len(names)} joints"
         values = [column.tolist() if hasattr(column, "tolist") else column for column in columns]
-        rows, refused = self._rows, 0
-        for at, name in enumerate(names):
+        rows, refused = self._rows, max(0, len(names) - _MAX_JOINTS)
+        for at, name in enumerate(names[:_MAX_JOINTS]):
             row = rows.get(name)
             if row is None:
                 if len(rows) >= _MAX_JOINTS:
-                    refused = len(names) - at
-                    break
+                    refused += 1
+                    continue
                 self._count += 1
                 row = rows[name] = {"key": name, "name": bounded(name, 200) or "?", "at": now}
                 row["number"] = self._count
@@ -172,7 +181,7 @@ class JointTopic(MergedTopic):
             self._order_now = self._sorted()
         return self._order_now
 
-    def _sorted(self) -> Sequence[Any]:
+    def _sorted(self) -> list[str]:
         rows = self._rows
         if self._sort == "message":
             return sorted(rows, key=lambda name: rows[name]["number"])
@@ -193,6 +202,7 @@ class JointTopic(MergedTopic):
     def _forget(self) -> None:
         super()._forget()
         self._order_now = []
+        self._newest = {}
         if not self._description:  # of a parameter of another robot
             self._joints, self._looked_at = {}, -math.inf
         report(self, uncounted=0)

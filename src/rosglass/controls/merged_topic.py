@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import time
+from collections import deque
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.qos import QoS, Reliability
 from rosglass.controls.live_topic import LiveTopic
 from rosglass.controls.row_model import RowModel
+from rosglass.qml.elements.element import single_shot
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import QtCore, Slot, is_valid
 
@@ -20,6 +23,12 @@ __all__ = ["MergedTopic"]
 
 #: Seconds between two looks at rows that have become old.
 _REVIEW_S = 0.5
+#: Seconds of the GUI thread that the messages of one turn may take; further ones wait for the next.
+_TURN_S = 0.015
+#: Seconds that messages wait; all but the newest are lost after that.
+_MOST_WAITED_S = 1.0
+#: Milliseconds until the next turn while messages wait.
+_NEXT_TURN_MS = 50
 
 
 class MergedTopic(LiveTopic):
@@ -48,6 +57,13 @@ class MergedTopic(LiveTopic):
         super().__init__(parent, runtime)
         self._rows: dict[Any, dict[str, Any]] = {}
         self._model = RowModel(self.ROLES, self._rows, self)
+        #: When the present turn ends.
+        self._turn_end = math.inf
+        #: Messages that wait for the next turn, with the times when they arrived; and how many had
+        #: to make room for newer ones.
+        self._backlog: deque[tuple[Sample, float]] = deque()
+        self._left_out = 0
+        self._next_turn = single_shot(self, self._deliver)
         #: Whether the rows are those of a former robot; whether they differ from what is shown.
         self._former = self._dirty = False
         self._reviewed = 0.0
@@ -73,6 +89,14 @@ class MergedTopic(LiveTopic):
         self._model.arrange(self._order(self._reviewed))
 
     def _show(self, sample: Sample, held: float) -> None:
+        begin = time.monotonic()
+        if begin > self._turn_end:
+            self._backlog.append((sample, begin - held))
+            if len(self._backlog) > self._profile.depth:
+                self._backlog.popleft()
+                self._left_out += 1
+            return
+        self._turn_end = min(self._turn_end, begin + _TURN_S)
         super()._show(sample, held)
         if not is_valid(self) or self._sample is not sample or self._refuses_type():
             return
@@ -87,7 +111,18 @@ class MergedTopic(LiveTopic):
 
     @Slot()
     def _deliver(self) -> None:
+        self._turn_end = math.inf
+        backlog, self._backlog = self._backlog, deque()
+        while backlog:
+            sample, arrival = backlog.popleft()
+            waited = time.monotonic() - arrival
+            if waited > _MOST_WAITED_S and backlog:
+                self._left_out += 1
+            else:
+                self._show(sample, waited)
         super()._deliver()
+        if is_valid(self) and self._backlog:
+            self._next_turn.start(_NEXT_TURN_MS)
         if is_valid(self) and self._dirty:
             self._arrange()
 
@@ -101,7 +136,12 @@ class MergedTopic(LiveTopic):
         self._former = True
         super()._on_created(endpoint)
 
+    def _on_closed(self, endpoint: Any) -> None:
+        self._backlog.clear()
+        super()._on_closed(endpoint)
+
     def _clear_shown(self) -> None:
+        self._backlog.clear()
         super()._clear_shown()
         self._forget()
         self._arrange()
@@ -109,4 +149,4 @@ class MergedTopic(LiveTopic):
     def _refresh(self) -> None:
         super()._refresh()
         if self._endpoint is not None:
-            report(self, lost=self._endpoint.statistics().dropped)
+            report(self, lost=self._endpoint.statistics().dropped + self._left_out)

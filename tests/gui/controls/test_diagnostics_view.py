@@ -102,6 +102,23 @@ def test_nothing_is_cut_without_a_count(shown: Any, controls: Any, wait: Any) ->
     wait(lambda: "10 reports of further parts" in controls.find("more").property("text"))
 
 
+def test_flood_is_merged_in_turns(shown: Any, wait: Any) -> None:
+    """The GUI thread is not held for all at once, and the newest message counts."""
+    view, publisher, rows = shown()
+    values = {f"key{at}": "v" for at in range(20)}
+    large = [part(f"{at:04}", 0, "ok", **values) for at in range(1000)]
+    for _ in range(110):
+        publisher.publish(status=large)
+    publisher.publish(status=[part("0500", 2, "the last")])
+    wait(lambda: view.property("errors") == 1)
+    assert rows()[0]["text"] == "the last"
+    assert view.property("total") == 1000
+    assert view.property("reports").property("lost") > 0
+    kept = [len(row["values"]) for row in rows()]
+    assert sum(kept) <= 10_000
+    assert sum(kept) + sum(row["more"] for row in rows()) == 19_980
+
+
 def test_hostile_texts_are_plain_and_bounded(shown: Any, controls: Any, wait: Any) -> None:
     view, publisher, rows = shown()
     publisher.publish(status=[part(HOSTILE, 7, HOSTILE, HOSTILE, k=HOSTILE)])

@@ -142,6 +142,15 @@ def test_compass_of_an_odometry_shows_the_frame(shown: Any, controls: Any) -> No
     assert controls.find("rose").property("rotation") == pytest.approx(-30)
 
 
+def test_name_of_a_frame_is_plain_and_bounded(shown: Any, controls: Any) -> None:
+    item, publish = shown("Compass {}", ODOMETRY)
+    message = odometry()
+    message["header"]["frame_id"] = "<b>o</b>\x1b\u202e" + "x" * 1_000_000
+    publish(**message)
+    assert item.property("origin").startswith("from x of <b>o</b>\ufffd\ufffdx")
+    assert len(item.property("origin")) < 60
+
+
 def test_compass_of_an_odometry_may_be_north(shown: Any) -> None:
     item, publish = shown('Compass { reference: "true" }', ODOMETRY)
     publish(**odometry(yaw=90))

@@ -38,7 +38,7 @@ LiveFrame {
         || turns_.fault
     readonly property bool known_: !fault_ && turns_.yaw !== undefined
     readonly property string from_: reference || (live.messageType === "nav_msgs/msg/Odometry" ? "frame" : "magnetic")
-    readonly property string frame_: message ? (message.header.frame_id.slice(0, 40) || qsTr("a frame without a name")) : ""
+    readonly property string frame_: message ? (Orientation.word(message.header.frame_id) || qsTr("a frame without a name")) : ""
     // Degrees clockwise from the top of the rose.
     readonly property real clockwise_: !known_ ? 0
         : (convention === "NED" ? turns_.yaw : north ? 90 - turns_.yaw : -turns_.yaw)

@@ -38,3 +38,8 @@ function unknown(convention) {
 function whole(degrees) {
     return Math.round(degrees) + 0
 }
+
+// Return a name without characters that control a text or its direction, and not too long.
+function word(name) {
+    return name.slice(0, 40).replace(/[\u0000-\u001f\u007f-\u009f\u2028-\u202e\u2066-\u2069]/g, "\ufffd") + (name.length > 40 ? "…" : "")
+}
