@@ -55,6 +55,11 @@ def _topics(names: list[Any]) -> list[str]:
     return [str(name) for name in names]
 
 
+def _frame_name(name: str) -> str:
+    """Return a frame without ROS 1's leading slash."""
+    return name.lstrip("/")
+
+
 class MapScene(Element):
     """The contents of a map: its layers, and where the robot is. See the page of ``MapView``."""
 
@@ -75,9 +80,9 @@ class MapScene(Element):
     #: The namespace of the topics ``tf`` and ``tf_static``, where they are not global.
     tfNs = Writable(str, "")
     #: The fixed frame; empty for that of the map.
-    frame = Writable(str, "", then="_on_frame")
+    frame = Writable(str, "", _frame_name, then="_on_frame")
     #: The frame of the robot; without a namespace.
-    robotFrame = Writable(str, "base_link", then="_on_frame")
+    robotFrame = Writable(str, "base_link", _frame_name, then="_on_frame")
     #: Milliseconds without a new transform after which the robot's position is old.
     timeout = Writable(int, 1500, at_least(0), then="_on_tick", unit="ms")
     camera = Writable(QtCore.QObject, None, then="_on_camera")
@@ -196,10 +201,8 @@ class MapScene(Element):
         else:
             try:
                 wanted = self._select(node)
-            except Error as error:
-                self._set_problem(f"MapView: {error}")
+            except Error:  # the node was closed
                 return
-            self._set_problem("")
         if wanted == [*self._layers]:
             return
         before, self._layers = self._layers, {}
@@ -230,15 +233,23 @@ class MapScene(Element):
         within = resolve_namespace(node, self.ns).rstrip("/") + "/" if self.ns else "/"
         graph = {name: types for name, types in node.topics().items() if name.startswith(within)}
         chosen: dict[tuple[str, str], None] = {}
-        more = 0
+        more, problem = 0, ""
         for kind, layer in LAYERS.items():
-            named = [
-                node.resolve(within_namespace(self.ns, one)) for one in lists[kind] if one != _ALL
-            ]
+            named = []
+            for one in lists[kind]:
+                if one != _ALL:
+                    try:
+                        named.append(node.resolve(within_namespace(self.ns, one)))
+                    except Error as error:  # the others are shown
+                        problem = f"MapView: {error}"
             found: list[str] = []
             if _ALL in lists[kind]:
                 # Those that are shown stay: their publisher may come back.
-                found = [topic for shown, topic in self._layers if shown == kind]
+                found = [
+                    topic
+                    for shown, topic in self._layers
+                    if shown == kind and topic.startswith(within)
+                ]
                 found += [
                     name
                     for name, types in sorted(graph.items())
@@ -249,6 +260,7 @@ class MapScene(Element):
             most = 1 if kind == "map" else _MOST_FOUND
             more += 0 if kind == "map" else max(0, len(found) - most)
             chosen |= dict.fromkeys((kind, name) for name in [*named, *found[:most]])
+        self._set_problem(problem)
         report(self, more=more)
         self._find_actions(node, within)
         return [*chosen]

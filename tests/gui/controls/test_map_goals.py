@@ -266,6 +266,29 @@ def test_waypoints_are_driven_in_order(
     wait(lambda: "without 1 of the waypoints" in message(live_controls))
 
 
+@zenoh
+def test_goal_of_one_server_ends_that_of_another(
+    live_controls: Any, nav2: Navigation, wait: Callable[..., None]
+) -> None:
+    nav2.offer("/follow_waypoints", "FollowWaypoints")
+    nav2.feedback = {}
+    view, _ = show(live_controls, wait)
+    goals = view.property("goals")
+    wait(lambda: view.property("scene").property("waypointsAction"))
+    goals.sendWaypoints([{"x": 1.0, "y": 1.0, "yaw": 0.0}])
+    wait(lambda: nav2.goals)
+    nav2.offer("/navigate_to_pose", "NavigateToPose")
+    wait(lambda: view.property("scene").property("goalAction"))
+    goals.send(3.0, 1.0, 0.0)
+    wait(lambda: len(nav2.goals) == 2)
+    wait(lambda: nav2.goals[0].is_cancel_requested)
+    assert goals.property("active") == "goal"
+    assert not nav2.goals[1].is_cancel_requested
+    view.setProperty("ns", "/robot2")
+    assert goals.property("active") == ""
+    assert message(live_controls) == "Goal: the goal of the other robot goes on"
+
+
 def test_goal_without_navigation_is_refused_and_published_with_a_subscriber(
     controls: Any, wait: Callable[..., None]
 ) -> None:

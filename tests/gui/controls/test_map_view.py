@@ -337,3 +337,34 @@ def test_closing_while_tiles_are_made_leaves_nothing(
         wait(lambda view=view: view.property("scene").property("hasMap"))
         controls.window.deleteLater()
         wait(lambda: robot.map.subscription_count() == 0)
+
+
+def test_topics_are_those_of_a_namespace(controls: Any, wait: Callable[..., None]) -> None:
+    node = controls.robot
+    for name in ("/robot1", "/robot2"):
+        publisher = node.create_publisher(f"{name}/map", GRID, QoS.latched())
+        publisher.publish(
+            grid(np.zeros((10, 10 if name == "/robot1" else 20)), frame=f"{name[1:]}_map")
+        )
+        node.create_publisher(f"{name}/scan", "sensor_msgs/msg/LaserScan")
+    view = controls.show(
+        'MapView { anchors.fill: parent; ns: "/robot2"; robotFrame: "/robot2_base" }'
+    )
+    scene = view.property("scene")
+    wait(lambda: scene.property("hasMap"))
+    assert [one.property("topic") for one in scene.layers] == ["/robot2/map", "/robot2/scan"]
+    assert scene.property("fixedFrame") == "robot2_map"
+    assert scene.property("robotFrame") == "robot2_base"
+    view.setProperty("ns", "/robot1")
+    wait(lambda: scene.property("fixedFrame") == "robot1_map")
+    assert layer(view, "map").grid.tiles.columns == 10
+
+
+def test_invalid_names_are_named(controls: Any, robot: Robot, wait: Callable[..., None]) -> None:
+    robot.start()
+    view = controls.show('MapView { anchors.fill: parent; scans: ["not a topic"] }')
+    wait(lambda: "'not a topic' contains ' '" in view.property("status"))
+    wait(lambda: view.property("scene").property("hasMap"))
+    view.setProperty("scans", [])
+    wait(lambda: is_complete(view))
+    wait(lambda: view.property("status") == "")

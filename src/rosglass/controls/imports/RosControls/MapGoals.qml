@@ -33,6 +33,7 @@ QtObject {
     property var publishers_: ({})
     property int number_: 0
     property bool accepted_: false
+    property string action_: ""
 
     function within_(name) {
         return ns && name.charAt(0) !== "/" ? ns.replace(/\/+$/, "") + "/" + name : name
@@ -123,6 +124,10 @@ QtObject {
         return true
     }
     function start_(what, action, type, goal, list) {
+        // Servers end their goal for a new one, but not that of another server.
+        if (active && handle_ && action_ !== action)
+            handle_.cancel()
+        action_ = action
         const number = ++number_
         const isCurrent = () => number === goals.number_
         const client = Ros2.createActionClient(action, type)
@@ -196,6 +201,17 @@ QtObject {
              : qsTr("outcome unknown: %1").arg(reason)
         text = text.slice(0, 300)
         bad = result.code !== 4 && result.code !== 5 || missed > 0
+        active = ""
+        cancelling = false
+        handle_ = null
+        poses = []
+        distance = NaN
+    }
+    // Follow the goal no longer: it is another robot's.
+    function leave_() {
+        ++number_
+        text = active ? qsTr("the goal of the other robot goes on") : ""
+        bad = active !== ""
         active = ""
         cancelling = false
         handle_ = null

@@ -69,7 +69,10 @@ LiveFrame {
     function place_(x, y, yaw) {
         const what = tool
         if (what === "waypoints") {
-            waypoints = waypoints.concat([{ x: x, y: y, yaw: yaw }]).slice(0, 100)
+            if (waypoints.length < 100)
+                waypoints = waypoints.concat([{ x: x, y: y, yaw: yaw }])
+            else
+                goals_.refuse_(qsTr("there are 100 waypoints already"))
             return
         }
         tool = ""
@@ -106,11 +109,22 @@ LiveFrame {
     note: scene_.robotSeen && track ? qsTr("%1 m driven").arg(scene_.driven.toFixed(1)) : ""
     contentWidth: 320 * Theme.size
     contentHeight: 240 * Theme.size
+    onNsChanged: {
+        tool = ""
+        fitted_ = false
+        goals_.leave_()
+    }
     onFollowChanged: lookAtRobot_()
     onHeadingUpChanged: lookAtRobot_()
     onToolChanged: {
-        if (tool)
+        if (tool) {
+            // What became of the last goal has been read.
+            if (!goals_.active) {
+                goals_.text = ""
+                goals_.bad = false
+            }
             goals_.prepare(tool)
+        }
         else
             waypoints = []
     }
@@ -291,11 +305,12 @@ LiveFrame {
             objectName: "message"
             anchors.centerIn: parent
             width: Math.min(implicitWidth, plane.width - 2 * Theme.gap)
-            text: view.tool === "goal" ? qsTr("press at the goal, drag to its heading")
+            text: view.tool && goals_.bad ? goals_.text
+                : view.tool === "goal" ? qsTr("press at the goal, drag to its heading")
                 : view.tool === "pose" ? qsTr("press where the robot is, drag to its heading")
                 : view.tool === "waypoints" ? qsTr("press and drag for each waypoint")
                 : goals_.text ? qsTr("Goal: %1").arg(goals_.text) : ""
-            color: !view.tool && goals_.bad ? Theme.bad : Theme.text
+            color: goals_.bad ? Theme.bad : Theme.text
             font.pixelSize: Theme.small
         }
     }
