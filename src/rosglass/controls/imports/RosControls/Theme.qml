@@ -47,7 +47,9 @@ QtObject {
     readonly property color faint: colors.faint
     readonly property color track: colors.track
     readonly property color accent: colors.accent
-    readonly property color onAccent: colors.onAccent
+    // QML takes a binding here for a handler of a signal "accent".
+    property color onAccent
+    readonly property QtObject onAccent_: Binding { target: theme; property: "onAccent"; value: theme.colors.onAccent }
     readonly property color good: colors.good
     readonly property color warn: colors.warn
     readonly property color bad: colors.bad
