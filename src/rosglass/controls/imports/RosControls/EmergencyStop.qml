@@ -399,7 +399,7 @@ Item {
         objectName: "unlock"
         anchors { horizontalCenter: parent.horizontalCenter; bottom: collar.top; bottomMargin: Theme.gap }
         visible: stop.blocks
-        width: Math.min(190 * Theme.size, stop.diameter_ + 24)
+        width: Math.min(190 * Theme.size, stop.width)
         height: 34 * Theme.size
         radius: height / 2
         color: Theme.shade

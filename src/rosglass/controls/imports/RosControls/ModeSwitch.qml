@@ -272,12 +272,16 @@ LiveFrame {
         onTriggered: modeSwitch.refuse_(qsTr("%1 was requested, and not confirmed within %2 s").arg(modeSwitch.text_(modeSwitch.requested)).arg((modeSwitch.timeout / 1000).toFixed(1)))
     }
 
+    // What was refused is said in full colour.
+    body.opacity: 1
+
     Column {
         id: column
         width: parent.width
         spacing: Theme.gap / 2
         Flow {
             id: flow
+            opacity: modeSwitch.stale ? 0.35 : 1
             width: parent.width
             spacing: Theme.gap / 2
             Repeater {
