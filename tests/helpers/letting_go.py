@@ -419,7 +419,9 @@ def main(file: str, url: str) -> int:
         item(name).setProperty(key, value)
 
     def reconnect() -> None:
-        app.session.url = app.session.url.replace("127.0.0.1", "localhost", 1)
+        hosts = ["127.0.0.1", "localhost"]
+        before, after = hosts if hosts[0] in app.session.url.partition("?")[0] else hosts[::-1]
+        app.session.url = app.session.url.replace(before, after, 1)
 
     class Clock:
         """The module `time`, with the system's clock changed."""

@@ -127,7 +127,7 @@ def _has_modal_popup(window: Any) -> bool:
     """Return whether a modal popup of Qt Quick is open in a window."""
     overlay = popup_layer(window)
     for shown in overlay.childItems() if overlay is not None and overlay.isVisible() else ():
-        is_popup = shown.isVisible() and shown.metaObject().className() == "QQuickPopupItem"
+        is_popup = shown.isVisible() and shown.inherits("QQuickPopupItem")
         if is_popup and shown.parent().property("modal"):
             return True
     return False
@@ -136,6 +136,8 @@ def _has_modal_popup(window: Any) -> bool:
 def popup_layer(window: Any) -> Any:
     """Return the item of a window that holds its open popups; None while there are no popups."""
     for item in window.contentItem().childItems():
-        if item.metaObject().className().startswith("QQuickOverlay"):
+        # Not by metaObject(), whose wrapper outlives the object: PySide takes the next one at its
+        # address for it.
+        if item.inherits("QQuickOverlay"):
             return item
     return None

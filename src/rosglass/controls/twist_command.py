@@ -16,7 +16,7 @@ from rosglass.interfaces.names import join_name
 from rosglass.qml.elements.element import Element
 from rosglass.qml.elements.image_sinks import window_of
 from rosglass.qml.engine.dialect import within_namespace
-from rosglass.qml.engine.log import plain_path
+from rosglass.qml.engine.log import context_of, plain_path
 from rosglass.qml.engine.properties import ReadOnly, Writable, report, within
 from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QtCore, QtGui, QtQuick, Signal, Slot, is_alive
@@ -69,8 +69,9 @@ class _Input:
     """
 
     def __init__(self, item: QtCore.QObject, fallback: QtCore.QObject) -> None:
-        kind = getattr(type(item), "QML_NAME", item.metaObject().className().partition("_QML")[0])
-        self.item, self.name = item, item.objectName() or kind
+        context = context_of(item)
+        name = context.nameForObject(item) if context is not None else ""
+        self.item, self.name = item, item.objectName() or name or type(item).__name__
         self.file, self.off = "", ""
         self.held, self.silent = False, 0
         self.kept: list[Any] = []
@@ -289,6 +290,11 @@ class TwistCommand(Element):
     def _on_quit(self) -> None:
         self._halt("the program ends")
 
+    @Slot()
+    def _on_reload(self) -> None:
+        if is_alive(self):
+            self._halt("the interface is loaded again")
+
     def _on_script_errors(self, warnings: Sequence[QtQml.QQmlError]) -> None:
         """Halt if an error is in the file that steers: it may never let go."""
         holder = self._steers
@@ -345,6 +351,8 @@ class TwistCommand(Element):
             return False
         app: Any = QtCore.QCoreApplication.instance()
         app.aboutToQuit.connect(self._on_quit)
+        if self._session is not None:
+            self._session.reloading.connect(self._on_reload)
         self._cleanup["focus"] = self._focus.stop
         if isinstance(app, QtGui.QGuiApplication):
             app.focusWindowChanged.connect(self._check)

@@ -317,6 +317,8 @@ class Session(QtCore.QObject):
     forgotten = Signal()
     #: A waiting call from QML has ended and is about to return to QML.
     call_ended = Signal()
+    #: An interface is about to be loaded again, which keeps the GUI thread busy.
+    reloading = Signal()
 
     #: Seconds that JavaScript may compute without a break before it is ended; 0 for no limit.
     #: Invalid values raise Error.

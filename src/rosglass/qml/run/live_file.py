@@ -430,6 +430,8 @@ class LiveFile(QtCore.QObject):
         if not os.path.isfile(self.path):  # noqa: PTH113 - pathlib's may raise
             raise QmlError(f"{self.path}: there is no such file")
         forget_repeats()
+        if self.made is not None:
+            self._session.reloading.emit()
         engine = self._new_engine() if self._used else self.engine
         self._used = True
         paths = engine.importPathList()

@@ -5,6 +5,8 @@ import RosControls 1.0
 Item {
     id: drive
 
+    objectName: "DriveKeys"
+
     // What it steers; without one, a TwistCommand of its own on `topic`.
     property var command: own_
     property string topic: "cmd_vel"
