@@ -368,3 +368,39 @@ def test_invalid_names_are_named(controls: Any, robot: Robot, wait: Callable[...
     view.setProperty("scans", [])
     wait(lambda: is_complete(view))
     wait(lambda: view.property("status") == "")
+
+
+def test_wheel_zooms_about_the_pointer_and_keys_move_and_turn(
+    controls: Any, robot: Robot, wait: Callable[..., None]
+) -> None:
+    from rosglass.qt import QtCore, QtGui, optional
+
+    robot.start()
+    view = controls.show("MapView { anchors.fill: parent; tools: false }")
+    camera, plane = view.property("camera"), controls.find("plane")
+    wait(lambda: is_complete(view))
+    before, scale = camera.toMap(60, 40), camera.scale
+    at = plane.mapToScene(QtCore.QPointF(60, 40))
+    none = QtCore.Qt.MouseButton.NoButton
+    wheel = QtGui.QWheelEvent(
+        at, at, QtCore.QPoint(), QtCore.QPoint(0, 240), none,
+        QtCore.Qt.KeyboardModifier.NoModifier, QtCore.Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    QtCore.QCoreApplication.sendEvent(controls.window, wheel)
+    assert camera.scale == pytest.approx(scale * 1.44)
+    assert camera.toMap(60, 40).x() == pytest.approx(before.x())
+    test: Any = optional("QtTest")
+    plane.forceActiveFocus()
+    x = camera.centerX
+    test.QTest.keyClick(controls.window, QtCore.Qt.Key.Key_Right)
+    assert camera.centerX > x
+    test.QTest.keyClick(
+        controls.window, QtCore.Qt.Key.Key_Left, QtCore.Qt.KeyboardModifier.ShiftModifier
+    )
+    assert camera.rotation == pytest.approx(math.pi / 36)
+    test.QTest.keyClick(controls.window, QtCore.Qt.Key.Key_0)
+    assert camera.rotation == 0
+    test.QTest.keyClick(controls.window, QtCore.Qt.Key.Key_Home)
+    assert camera.scale == pytest.approx(scale)
+    test.QTest.keyClick(controls.window, QtCore.Qt.Key.Key_F)
+    assert view.property("follow")
