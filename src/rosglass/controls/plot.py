@@ -718,10 +718,7 @@ class PlotData(Element):
         for feed in self._feeds.values():
             received += feed.received
             malformed += feed.malformed
-            subscription = feed.subscription
-            if subscription is not None:
-                statistics = subscription.statistics()
-                lost += statistics.dropped + statistics.lost
+            lost += feed.lost
         forgotten = sum(line.samples.forgotten for line in self._lines if line.samples is not None)
         report(
             self, received=float(received), lost=float(lost + malformed), forgotten=float(forgotten)

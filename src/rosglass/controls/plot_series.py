@@ -40,6 +40,8 @@ _log = logging.getLogger("rosglass.qml")
 MAX_ELEMENTS = 64
 #: Seconds between two looks at the topics.
 _PERIOD_S = 1 / 30
+#: Looks between two counts of lost messages.
+_TURNS_PER_COUNT = 10
 #: Bytes of one topic's messages that may wait for the thread, the oldest are dropped and counted.
 _MAX_WAITING_BYTES = 64 << 20
 #: Samples of one line that are kept at most: 160 MB.
@@ -206,6 +208,7 @@ class TopicFeed:
         problem: Why nothing is received, or in which way the times are not as expected.
         received: Number of messages.
         malformed: Number of messages that could not be read.
+        lost: Number of messages that were lost on their way, or dropped as they came too fast.
         arrived: The node's steady time when messages were last taken; None before the first.
         offset_ns: How far the times of samples are ahead of this machine's clock.
         history_ns: Nanoseconds that samples are kept; 0 for no limit.
@@ -218,7 +221,7 @@ class TopicFeed:
         self.subscription: Subscription | None = None
         self._node: Node | None = None
         self.problem = self._time_problem = ""
-        self.received = self.malformed = self.offset_ns = 0
+        self.received = self.malformed = self.lost = self.offset_ns = 0
         self.arrived: float | None = None
         self._readers: dict[Any, _Reader | None] = {}
         self._clocks: dict[bytes, list[float]] = {}
@@ -278,6 +281,12 @@ class TopicFeed:
         self.received += len(samples)
         self.arrived = now
         self.problem = self._time_problem
+
+    def count_lost(self) -> None:
+        """Update the number of lost messages; not on the GUI thread: it receives what waits."""
+        if self.subscription is not None:
+            statistics = self.subscription.statistics()
+            self.lost = statistics.dropped + statistics.lost
 
     def _read(
         self, kind: MessageType, wire: str, fields: tuple[FieldFeed, ...], samples: list[Sample]
@@ -477,13 +486,17 @@ class PlotReceiver:
             thread.join(2.0)
 
     def _work(self) -> None:
+        turn = 0
         try:
             while not self._end.wait(_PERIOD_S):
+                turn += 1
                 self._follow(self._feeds)
                 now = self._node.steady()
                 for feed in self._open.values():
                     try:
                         feed.take(now)
+                        if turn % _TURNS_PER_COUNT == 0:
+                            feed.count_lost()
                     except Exception as error:  # noqa: BLE001, PERF203 - peers must not end the thread
                         _log.exception("plot of %s", feed.topic)
                         feed.problem = f"its messages could not be read: {error!r}"
