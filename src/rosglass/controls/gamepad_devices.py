@@ -407,16 +407,20 @@ class _Devices:
             try:
                 sdl = _Sdl()
             except Error as error:
-                self._announce(Snapshot(time.monotonic(), (), str(error)))
-                ended.wait()
+                self._fail(ended, str(error))
                 return
             try:
                 with guarded(_log, "gamepads are not read any more"):
                     self._read(sdl, ended)
             finally:
                 sdl.close()
-            if not ended.is_set():
-                self._announce(Snapshot(time.monotonic(), (), "gamepads are not read any more"))
+            self._fail(ended, "gamepads are not read any more; the log says why")
+
+    def _fail(self, ended: threading.Event, problem: str) -> None:
+        """Report a problem, to later listeners as well."""
+        while not ended.is_set():
+            self._announce(Snapshot(time.monotonic(), (), problem))
+            ended.wait(_SEARCH_S)
 
     def _read(self, sdl: _Sdl, ended: threading.Event) -> None:
         beat = 0.0

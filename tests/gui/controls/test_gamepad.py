@@ -392,9 +392,14 @@ def test_without_sdl_it_says_what_to_install(
     controls: Any, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "sdl2", None)
+    seen: list[Any] = []
+    end = devices.listen(seen.append)
+    wait(lambda: seen and seen[-1].problem)
+    # Also a gamepad that comes later.
     view = controls.show("GamepadView { anchors.fill: parent; gamepad: Gamepad {} }")
     wait(lambda: "sdl2 is not installed; install it with: pip install" in view.property("status"))
     assert "[gamepad]" in view.property("status")
+    end()
 
 
 def test_sdl_leaves_signals_alone(start: Any) -> None:
