@@ -129,7 +129,7 @@ def screen(url: str, count: int) -> None:
 
 
 def turn(role: str, where: str, count: int, received: list[tuple[float, float]]) -> list[float]:
-    """Return the latencies in ms of one round; a missing Twist counts as infinite."""
+    """Return the latencies in ms of one round; infinite if it halted: the screen stood still."""
     received.clear()
     command = [sys.executable, __file__, "--role", role, where, str(count)]
     result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
@@ -139,10 +139,12 @@ def turn(role: str, where: str, count: int, received: list[tuple[float, float]])
     arrived: dict[int, float] = {}
     for at, speed in received:
         arrived.setdefault(round(1e6 * speed), at)
-    return [
-        1000 * (arrived.get(round(1e6 * speed), float("inf")) - at)
-        for at, speed in json.loads(lines[-1])
-    ]
+    found, latest = [], float("inf")
+    for at, speed in reversed(json.loads(lines[-1])):
+        # A later move may have replaced this one before it was sent.
+        latest = min(latest, arrived.get(round(1e6 * speed), float("inf")))
+        found.append(1000 * (latest - at))
+    return found
 
 
 def show(name: str, found: list[float]) -> float:
