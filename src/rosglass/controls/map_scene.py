@@ -438,6 +438,15 @@ class MapScene(Element):
 
     # For QML.
 
+    @Slot(str, result=str)
+    def absolute(self, topic: str) -> str:
+        """Return the absolute name of a topic; unchanged if it is invalid or there is no node."""
+        node = self.node
+        try:
+            return topic if node is None else node.resolve(topic)
+        except Error:
+            return topic
+
     @Slot(str, result=int)
     def subscribers(self, topic: str) -> int:
         """Return how many nodes receive a topic."""

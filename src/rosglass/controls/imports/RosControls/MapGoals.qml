@@ -107,13 +107,13 @@ QtObject {
         const publisher = publisher_(poseTopic, "geometry_msgs/msg/PoseWithCovarianceStamped")
         const sent = publisher.publish({ header: { frame_id: scene.fixedFrame },
                                          pose: { pose: pose_(pose), covariance: covariance } })
-        text = sent ? qsTr("the pose was sent to %1").arg(publisher.topic) : qsTr("the pose was not sent: %1").arg(publisher.problem || qsTr("no connection"))
+        text = sent ? qsTr("the pose was sent to %1").arg(scene.absolute(within_(poseTopic))) : qsTr("the pose was not sent: %1").arg(publisher.problem || qsTr("no connection"))
         bad = !sent
         return sent
     }
     function publishGoal_(pose) {
         const publisher = publisher_(goalTopic || scene.goalTopic, "geometry_msgs/msg/PoseStamped", Ros2.CommandQoS())
-        const name = publisher.topic
+        const name = scene.absolute(within_(goalTopic || scene.goalTopic))
         if (scene.subscribers(name) === 0)
             return refuse_(qsTr("not sent: there is no navigation action, and %1 has no subscriber").arg(name))
         if (!publisher.publish(stamped_(pose)))
