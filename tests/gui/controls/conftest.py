@@ -18,16 +18,17 @@ class ControlBench:
         robot: The robot's node.
         engine: The QML engine.
         window: The window that shows the control.
+        bench: The bench with the engine, its session, and the nodes in memory.
     """
 
     def __init__(self, running: Any, wait: Any) -> None:
-        self._bench, self._wait = running, wait
+        self.bench, self._wait = running, wait
         self.robot, self.engine, self.window = running.robot, running.engine, None
         self.engine_session = running.session
 
     def show(self, control: str, width: int = 400, height: int = 300, imports: str = "") -> Any:
         """Show a control, such as ``Battery { topic: "/battery" }``; return it."""
-        self.window = self._bench.load(
+        self.window = self.bench.load(
             f"Window {{ width: {width}; height: {height}; visible: true; color: Theme.background\n"
             f"property Item control: made\nItem {{ anchors.fill: parent\n{named(control)} }} }}",
             f"import QtQuick 2.15\nimport QtQuick.Window 2.15\nimport RosControls 1.0\n{imports}",

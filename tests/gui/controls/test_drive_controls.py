@@ -46,7 +46,7 @@ class Drive:
         self.window.requestActivate()
         wait(self.window.isActive)
         wait(lambda: controls.robot.publishers("/cmd_vel"))
-        wait.settled(controls._bench.session)
+        wait.settled(controls.bench.session)
 
     def send(self, event: QtCore.QEvent) -> None:
         QtCore.QCoreApplication.sendEvent(self.window, event)

@@ -130,7 +130,7 @@ def test_received_messages_do_not_disturb_editing(controls: Any, wait: Any) -> N
     unfold(controls, "pose", "pose.position")
     for _ in range(5):
         publisher.publish(pose={"position": {"x": 9.0}})
-    wait.settled(controls._bench.session)
+    wait.settled(controls.bench.session)
     assert dict(rows(controls, "key", "value"))["pose.position.x"] == "1.0"
     view.setProperty("topic", "/other")
     wait(lambda: not view.property("editing"))

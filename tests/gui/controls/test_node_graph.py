@@ -27,7 +27,7 @@ def items(controls: Any, *roles: str) -> dict[str, Any]:
 
 
 def test_nodes_and_topics_are_laid_out_from_left_to_right(controls: Any, wait: Any) -> None:
-    viewer = controls._bench.world.connect(None, "viewer")
+    viewer = controls.bench.world.connect(None, "viewer")
     controls.robot.create_publisher("/image", STRING)
     viewer.create_subscription("/image", STRING)
     controls.show("NodeGraph {}")
@@ -40,7 +40,7 @@ def test_nodes_and_topics_are_laid_out_from_left_to_right(controls: Any, wait: A
 
 
 def test_nodes_are_connected_directly_without_topics(controls: Any, wait: Any) -> None:
-    viewer = controls._bench.world.connect(None, "viewer")
+    viewer = controls.bench.world.connect(None, "viewer")
     controls.robot.create_publisher("/image", STRING)
     viewer.create_subscription("/image", STRING)
     controls.show("NodeGraph { topics: false }")
@@ -83,7 +83,7 @@ def test_keys_select_zoom_and_copy(controls: Any, wait: Any) -> None:
 def test_conflicts_are_in_words(controls: Any, wait: Any) -> None:
     from rosglass.comm import QoS
 
-    viewer = controls._bench.world.connect(None, "viewer")
+    viewer = controls.bench.world.connect(None, "viewer")
     controls.robot.create_publisher("/image", STRING, QoS.sensor_data())
     viewer.create_subscription("/image", STRING, qos=QoS())
     controls.show("NodeGraph {}")
@@ -91,7 +91,7 @@ def test_conflicts_are_in_words(controls: Any, wait: Any) -> None:
 
 
 def test_a_hundred_nodes(controls: Any, wait: Any) -> None:
-    world = controls._bench.world
+    world = controls.bench.world
     nodes = [world.connect(None, f"n{number}") for number in range(100)]
     for number, node in enumerate(nodes):
         node.create_publisher(f"/t{number}", STRING)

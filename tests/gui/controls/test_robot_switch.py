@@ -98,7 +98,7 @@ def test_given_namespaces_are_listed_before_they_are_there(controls: Any, wait: 
 
 
 def test_two_robots_of_one_name_are_named(controls: Any, wait: Any) -> None:
-    nodes = [controls._bench.world.connect(None, "base", "/anna") for _ in range(2)]
+    nodes = [controls.bench.world.connect(None, "base", "/anna") for _ in range(2)]
     keep = [node.create_subscription("/anna/cmd_vel", TWIST, lambda _: None) for node in nodes]
     robots = controls.show("RobotSwitch { width: 300 }")
     wait(lambda: robots.property("status").startswith("2 robots of this name"))
@@ -131,7 +131,7 @@ def test_other_publishers_are_named(controls: Any, wait: Any) -> None:
     _, keep = subscribe(controls, "")
     who = controls.show("WhoSteers { width: 300; TwistCommand {} }")
     wait(lambda: findings(who) == ["only this screen"])
-    nav = controls._bench.world.connect(None, "nav2", "/")
+    nav = controls.bench.world.connect(None, "nav2", "/")
     publisher = nav.create_publisher("/cmd_vel", TWIST)
     wait(lambda: findings(who) == ["/nav2 also publishes /cmd_vel"])
     assert who.property("level") == 1
@@ -146,7 +146,7 @@ def test_other_publishers_are_named(controls: Any, wait: Any) -> None:
 
 
 def test_nodes_of_one_name_are_named(controls: Any, wait: Any) -> None:
-    nodes = [controls._bench.world.connect(None, "base", "/") for _ in range(2)]
+    nodes = [controls.bench.world.connect(None, "base", "/") for _ in range(2)]
     keep = [node.create_subscription("/cmd_vel", TWIST, lambda _: None) for node in nodes]
     who = controls.show("WhoSteers { width: 300 }")
     wait(lambda: "2 nodes are called /base: all obey, or all steer" in findings(who))
@@ -156,7 +156,7 @@ def test_nodes_of_one_name_are_named(controls: Any, wait: Any) -> None:
 
 
 def test_locks_of_a_multiplexer_are_read(controls: Any, wait: Any) -> None:
-    mux = controls._bench.world.connect(None, "twist_mux", "/")
+    mux = controls.bench.world.connect(None, "twist_mux", "/")
     keep = [
         mux.create_subscription("/cmd_vel", TWIST, lambda _: None),
         mux.create_subscription("/nav_vel", TWIST, lambda _: None),

@@ -35,7 +35,7 @@ def test_frames_are_a_tree_with_ages(controls: Any, wait: Any) -> None:
 
 
 def test_two_parents_are_in_words(controls: Any, wait: Any) -> None:
-    other = controls._bench.world.connect(None, "amcl")
+    other = controls.bench.world.connect(None, "amcl")
     wheels, amcl = TransformBroadcaster(controls.robot), TransformBroadcaster(other)
     view = controls.show("TfTree {}")
     wait(lambda: wheels.publisher.subscription_count() and amcl.publisher.subscription_count())

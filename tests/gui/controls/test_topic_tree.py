@@ -44,7 +44,7 @@ def test_a_topic_that_appears_or_goes_changes_only_its_row(controls: Any, wait: 
 def test_conflicts_are_in_words(controls: Any, wait: Any) -> None:
     from rosglass.comm import QoS
 
-    other = controls._bench.world.connect(None, "viewer")
+    other = controls.bench.world.connect(None, "viewer")
     controls.robot.create_publisher("/image", STRING, QoS.sensor_data())
     other.create_subscription("/image", STRING, qos=QoS())
     controls.robot.create_publisher("/speed", STRING)
@@ -114,7 +114,7 @@ def test_a_lost_connection_is_said(controls: Any, wait: Any) -> None:
     controls.robot.create_publisher("/chat", STRING)
     view = controls.show("TopicTree {}")
     wait(lambda: "/chat" in rows(controls, "key"))
-    controls._bench.session.node.set_status(ConnectionState.LOST, "no router")
+    controls.bench.session.node.set_status(ConnectionState.LOST, "no router")
     wait(lambda: "not connected" in view.property("status"))
     assert view.property("stale")
     assert "/chat" in rows(controls, "key")

@@ -229,7 +229,7 @@ def steer_badly(drive: Drive) -> None:
 
 
 def lose_connection(drive: Drive) -> None:
-    drive.controls._bench.session.node.set_status(ConnectionState.LOST, "the cable is out")
+    drive.controls.bench.session.node.set_status(ConnectionState.LOST, "the cable is out")
 
 
 def change_clock(drive: Drive) -> None:
@@ -317,7 +317,7 @@ def test_a_lost_connection_halts_and_gets_its_zeros_later(drive: Drive) -> None:
     lose_connection(drive)
     drive.wait(lambda: drive.robot.zeros >= 8)
     assert not drive.silent()
-    drive.controls._bench.session.node.set_status(ConnectionState.CONNECTED, "")
+    drive.controls.bench.session.node.set_status(ConnectionState.CONNECTED, "")
     drive.stops("the robot is not connected: the cable is out")
 
 
