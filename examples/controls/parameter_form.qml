@@ -12,6 +12,6 @@ Window {
 
     ParameterForm {
         anchors { fill: parent; margins: Theme.gap }
-        node: "/robot"
+        nodeName: "/robot"
     }
 }

@@ -46,12 +46,12 @@ class Alarms(QtCore.QObject):
     unacknowledged = ReadOnly(int, 0)
     total = ReadOnly(int, 0)
     #: Alarms that are not listed, because there are too many.
-    uncounted = ReadOnly(int, 0)
+    omitted = ReadOnly(int, 0)
     #: Level of the worst alarm: 0 without one, 1 warning, 2 error, 3 silent.
     worst = ReadOnly(int, 0)
 
     _level: str
-    _uncounted: int
+    _omitted: int
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
@@ -135,7 +135,7 @@ class Alarms(QtCore.QObject):
         row = self._rows.get(key)
         if row is None:
             if len(self._rows) >= _MAX_ALARMS:
-                report(self, uncounted=self._uncounted + 1)
+                report(self, omitted=self._omitted + 1)
                 return []
             row = self._rows[key] = {"name": name, "times": 0, "active": False, "level": 0}
         news = not row["active"] or RANK[level] > RANK[row["level"]]
@@ -205,7 +205,7 @@ class Alarms(QtCore.QObject):
             unacknowledged=sum(not row["acknowledged"] for row in rows),
             total=len(rows),
             worst=max((row["level"] for row in rows), key=lambda level: RANK[level], default=0),
-            uncounted=self._uncounted if len(rows) >= _MAX_ALARMS else 0,
+            omitted=self._omitted if len(rows) >= _MAX_ALARMS else 0,
         ):
             return
         for name in raised:

@@ -45,10 +45,10 @@ class DiagnosticsTopic(MergedTopic):
     stales = ReadOnly(int, 0)
     total = ReadOnly(int, 0)
     #: Reports of parts that are not kept, because there are too many.
-    uncounted = ReadOnly(int, 0)
+    omitted = ReadOnly(int, 0)
 
     _filter: str
-    _uncounted: int
+    _omitted: int
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -87,7 +87,7 @@ class DiagnosticsTopic(MergedTopic):
                 for pair in (values[:kept] if row["more"] else values)
             ]
         if refused:
-            report(self, uncounted=self._uncounted + refused)
+            report(self, omitted=self._omitted + refused)
 
     def _order(self, now: float) -> list[Any]:
         counts, limit = [0, 0, 0, 0], self.silentAfter
@@ -118,7 +118,7 @@ class DiagnosticsTopic(MergedTopic):
 
     def _forget(self) -> None:
         super()._forget()
-        report(self, uncounted=0)
+        report(self, omitted=0)
 
     def parts(self) -> list[tuple[tuple[str, str], dict[str, Any]]]:
         """Return key and row of each part."""

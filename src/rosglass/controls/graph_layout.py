@@ -1,4 +1,5 @@
 """The element ``GraphLayout``: nodes and topics of the robot, laid out as a graph."""
+# ruff: noqa: N815 - the names of properties are QML's
 
 from __future__ import annotations
 
@@ -70,9 +71,9 @@ class GraphLayout(Element):
     #: Names of nodes and topics that are left out.
     hide = Writable(list, _HIDE, lambda names: [str(name) for name in names], then="_look")
     #: Whether hidden names are included, such as topics of actions.
-    hidden = Writable(bool, False, then="_look")
+    showHidden = Writable(bool, False, then="_look")
     #: Whether topics are drawn; otherwise nodes are connected directly.
-    topics = Writable(bool, True, then="_look")
+    showTopics = Writable(bool, True, then="_look")
     #: Nodes and topics, for a Repeater.
     items = ReadOnly(QtCore.QObject, read=lambda self: self._model)
     #: The parts of all connections, each between two columns, for a Repeater.
@@ -124,7 +125,11 @@ class GraphLayout(Element):
         self._looking, self._look_again = True, False
         within = resolve_namespace(node, self.ns).rstrip("/") + "/" if self.ns else "/"
         wanted = _Wanted(
-            self.filter.strip().lower(), within, frozenset(self.hide), self.hidden, self.topics
+            self.filter.strip().lower(),
+            within,
+            frozenset(self.hide),
+            self.showHidden,
+            self.showTopics,
         )
         session.background(lambda: _draw(node, wanted), weak_callback(self._on_drawn))
 

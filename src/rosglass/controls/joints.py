@@ -59,7 +59,7 @@ class JointTopic(MergedTopic):
     beyond = ReadOnly(int, 0)
     silent = ReadOnly(int, 0)
     #: Joints that are not kept, because there are too many.
-    uncounted = ReadOnly(int, 0)
+    omitted = ReadOnly(int, 0)
     #: Why the limits are not known, in words; empty if they are.
     limitsProblem = ReadOnly(str, _NO_DESCRIPTION)
 
@@ -156,7 +156,7 @@ class JointTopic(MergedTopic):
             )
             row["at"], row["fault"] = now, fault
             self._judge(row)
-        report(self, uncounted=refused)
+        report(self, omitted=refused)
 
     def _judge(self, row: dict[str, Any]) -> None:
         """Compare a joint with its limits."""
@@ -205,4 +205,4 @@ class JointTopic(MergedTopic):
         self._newest = {}
         if not self._description:  # of a parameter of another robot
             self._joints, self._looked_at = {}, -math.inf
-        report(self, uncounted=0)
+        report(self, omitted=0)

@@ -1,4 +1,5 @@
 """The element ``TopicRows``: all topics of the robot as a tree, with what is wrong with each."""
+# ruff: noqa: N815 - the names of properties are QML's
 
 from __future__ import annotations
 
@@ -110,7 +111,7 @@ class TopicRows(Element):
     #: Namespace of the topics; empty for all.
     ns = Writable(str, "", then="_show")
     #: Whether hidden topics are included, such as those of actions.
-    hidden = Writable(bool, False, then="_show")
+    showHidden = Writable(bool, False, then="_show")
     #: The rows, for a ListView.
     rows = ReadOnly(QtCore.QObject, read=lambda self: self._model)
     #: Topics that match, and all topics.
@@ -200,7 +201,7 @@ class TopicRows(Element):
         of_ns = {
             name: topic
             for name, topic in self._topics.items()
-            if name.startswith(within) and (self.hidden or not hidden(name))
+            if name.startswith(within) and (self.showHidden or not hidden(name))
         }
         matching = {
             name: topic

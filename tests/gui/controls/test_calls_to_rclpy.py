@@ -33,9 +33,9 @@ def test_controls_on_a_node_of_rclpy(live_controls: Any, robot: Any, wait: Any) 
     live_controls.show(
         """Column {
             ServiceButton { objectName: "lamp"; service: "/lamp"; request: ({data: true}) }
-            ServiceButton { objectName: "silent"; service: "/silent"; timeout: 0.5 }
+            ServiceButton { objectName: "silent"; service: "/silent"; timeout: 500 }
             ActionPanel { objectName: "count"; action: "/count"; goal: ({order: 3}); width: 300 }
-            ParameterForm { objectName: "form"; node: "/arm"; width: 400; height: 300 }
+            ParameterForm { objectName: "form"; nodeName: "/arm"; width: 400; height: 300 }
         }""",
         500,
         700,

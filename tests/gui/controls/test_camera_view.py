@@ -87,7 +87,7 @@ def test_equal_images_are_frozen_not_live(controls: Any, wait: Any) -> None:
     streaming(wait, camera, lambda: view.property("live"))
     streaming(wait, camera, lambda: view.property("frozen"), frozen=True)
     assert not view.property("live")
-    assert view.property("status").startswith("PICTURE FROZEN")
+    assert view.property("status").startswith("IMAGE FROZEN")
     streaming(wait, camera, lambda: view.property("live"))
 
 
@@ -97,7 +97,7 @@ def test_late_images_are_not_live(controls: Any, wait: Any) -> None:
     wait(camera.publisher.subscription_count)
     streaming(wait, camera, lambda: view.property("late"), late=5.0)
     assert not view.property("live")
-    assert view.property("status").startswith("PICTURE DELAYED")
+    assert view.property("status").startswith("IMAGE DELAYED")
 
 
 def test_image_without_pixels_is_named(controls: Any, wait: Any) -> None:
@@ -112,7 +112,7 @@ def test_image_without_pixels_is_named(controls: Any, wait: Any) -> None:
 
 def test_snapshot_is_saved_and_its_path_shown(controls: Any, wait: Any, tmp_path: Path) -> None:
     camera = Camera(controls)
-    view = controls.show(f'CameraView {{ anchors.fill: parent; snapshotFolder: "{tmp_path}" }}')
+    view = controls.show(f'CameraView {{ anchors.fill: parent; folder: "{tmp_path}" }}')
     view.snapshot()
     assert controls.find("note").property("text").startswith("NOT SAVED: no image")
     wait(camera.publisher.subscription_count)
@@ -123,7 +123,7 @@ def test_snapshot_is_saved_and_its_path_shown(controls: Any, wait: Any, tmp_path
     assert file.parent == tmp_path
     assert cv2.imread(str(file)).shape == (48, 64, 3)
     assert str(file) in controls.find("note").property("text")
-    view.setProperty("snapshotFolder", str(tmp_path / "missing"))
+    view.setProperty("folder", str(tmp_path / "missing"))
     click(controls, "snapshot")
     wait(lambda: controls.find("note").property("text").startswith("NOT SAVED"))
 

@@ -142,7 +142,7 @@ def test_a_lifecycle_node_is_brought_to_a_state_by_its_transitions(
     controls: Any, wait: Any
 ) -> None:
     lidar = Lifecycle(controls.robot)
-    modes = controls.show('ModeSwitch { width: 400; node: "/lidar" }')
+    modes = controls.show('ModeSwitch { width: 400; nodeName: "/lidar" }')
     wait(lambda: modes.property("note") == "unconfigured")
     controls.click("mode2")
     wait(lambda: modes.property("note") == "active")
@@ -157,7 +157,7 @@ def test_a_lifecycle_node_is_brought_to_a_state_by_its_transitions(
 
 
 def test_a_lifecycle_node_that_is_missing_is_named(controls: Any, wait: Any) -> None:
-    modes = controls.show('ModeSwitch { width: 400; node: "/lidar" }')
+    modes = controls.show('ModeSwitch { width: 400; nodeName: "/lidar" }')
     wait(lambda: "/lidar/get_state" in modes.property("status"), timeout=20)
     controls.click("mode2")
     assert "unknown" in outcome(controls)

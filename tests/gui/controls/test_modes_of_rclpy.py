@@ -30,7 +30,7 @@ def robot(ros_domains: list[int]) -> Any:
 def test_lifecycle_stop_and_publishers_of_rclpy(live_controls: Any, robot: Any, wait: Any) -> None:
     live_controls.show(
         """Column {
-            ModeSwitch { objectName: "modes"; node: "/lidar"; width: 400; timeout: 10000 }
+            ModeSwitch { objectName: "modes"; nodeName: "/lidar"; width: 400; timeout: 10000 }
             EmergencyStop { objectName: "stop"; service: "/halt" }
             WhoSteers { objectName: "who"; width: 400 }
         }""",

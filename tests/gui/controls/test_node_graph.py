@@ -43,7 +43,7 @@ def test_nodes_are_connected_directly_without_topics(controls: Any, wait: Any) -
     viewer = controls.bench.world.connect(None, "viewer")
     controls.robot.create_publisher("/image", STRING)
     viewer.create_subscription("/image", STRING)
-    controls.show("NodeGraph { topics: false }")
+    controls.show("NodeGraph { showTopics: false }")
     wait(lambda: graph(controls).property("segments").rowCount() == 1)
     assert set(items(controls)) == {"node /robot", "node /ui", "node /viewer"}
 

@@ -37,7 +37,7 @@ def shown(controls: Any, name: str) -> str:
 
 def show(controls: Any, wait: Any, more: str = "") -> Any:
     form = controls.show(
-        f'ParameterForm {{ node: "/arm"; anchors.fill: parent; {more} }}', 500, 500
+        f'ParameterForm {{ nodeName: "/arm"; anchors.fill: parent; {more} }}', 500, 500
     )
     wait(lambda: form.property("ready") and form.property("total") >= 6)
     wait(lambda: row(controls, "speed").property("value") == 1.5)
@@ -128,7 +128,7 @@ def test_changes_of_others_are_shown_but_not_under_the_hands(
 
 
 def test_node_that_appears_later_and_leaves(controls: Any, wait: Any, bench: Any) -> None:
-    form = controls.show('ParameterForm { node: "/arm" }')
+    form = controls.show('ParameterForm { nodeName: "/arm" }')
     assert form.property("status") == "waiting for /arm"
     arm = bench.world.connect(None, "arm", own_services=True)
     arm.parameters.declare("reach", 2)
@@ -164,7 +164,9 @@ def test_parameters_over_a_real_middleware(live_controls: Any, url: str, wait: A
     robot = live_controls.robot
     robot.parameters.declare("speed", 1.5)
     robot.parameters.declare("label", "x")
-    form = live_controls.show('ParameterForm { node: "/robot"; anchors.fill: parent }', 500, 500)
+    form = live_controls.show(
+        'ParameterForm { nodeName: "/robot"; anchors.fill: parent }', 500, 500
+    )
     wait(lambda: form.property("ready") and row_or_none(live_controls, "speed"))
     form.set("speed", 1)
     wait(lambda: robot.parameters.get("speed") == 1.0)
@@ -173,6 +175,8 @@ def test_parameters_over_a_real_middleware(live_controls: Any, url: str, wait: A
     robot.parameters.set({"speed": 0.25})
     wait(lambda: shown(live_controls, "speed") == "0.25")
     if url.startswith("ros1"):
-        whole = live_controls.show('ParameterForm { node: "/"; anchors.fill: parent }', 500, 500)
+        whole = live_controls.show(
+            'ParameterForm { nodeName: "/"; anchors.fill: parent }', 500, 500
+        )
         wait(lambda: whole.property("ready"))
         assert row_or_none(live_controls, "robot/speed") is not None

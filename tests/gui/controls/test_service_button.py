@@ -60,7 +60,7 @@ def test_server_that_appears_later_enables_the_button(controls: Any, wait: Any) 
 def test_server_that_never_answers_is_given_up(controls: Any, wait: Any) -> None:
     go = threading.Event()
     controls.robot.create_service_server("/slow", TRIGGER, lambda _: go.wait(30) and None)
-    button = controls.show('ServiceButton { service: "/slow"; timeout: 0.3 }')
+    button = controls.show('ServiceButton { service: "/slow"; timeout: 300 }')
     wait(lambda: button.property("ready"))
     button.call()
     assert button.property("busy")

@@ -22,7 +22,7 @@ Window {
 
     CameraView {
         anchors.fill: parent
-        buttons: false
+        tools: false
     }
     Column {
         anchors { left: parent.left; leftMargin: Theme.gap; top: parent.top; topMargin: 60 * Theme.size }

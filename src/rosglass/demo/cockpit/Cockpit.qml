@@ -74,7 +74,7 @@ Item {
         width: cockpit.cameraWidth; height: cockpit.cameraTall
         topic: "/camera/image_raw"; title: "front camera"; transport: "raw"
         reason: link.reason
-        buttons: false
+        tools: false
         // The figures of `rosglass demo` are read from the pixels of the image.
         fullResolution: true
     }

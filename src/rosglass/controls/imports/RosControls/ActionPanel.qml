@@ -18,14 +18,14 @@ LiveFrame {
     // Whether a goal is sent only after the button has been held down, for `holdTime` seconds.
     property bool hold: false
     property real holdTime: 1
-    // Seconds for a server to accept a goal.
-    property real timeout: 10
+    // Milliseconds for a server to accept a goal.
+    property int timeout: 10000
     // Returns the progress, 0 to 1, of a feedback; by default, of the fields that commonly have it.
     property var progressOf: null
     // Returns the text shown for a feedback or a result; by default, its first fields.
     property var describe: null
     // Returns why a result means failure although the goal succeeded; by default, of `success` or `ok`.
-    property var refusal: null
+    property var refusalOf: null
 
     // Whether a server is available, and whether a goal is under way.
     readonly property bool ready: client_ !== null && client_.ready
@@ -108,7 +108,7 @@ LiveFrame {
         feedback_ = result_ = undefined
         sentAt_ = fedAt_ = Date.now()
         silence_ = 0
-        client_.connectionTimeout = Math.round(1000 * (timeout > 0 && timeout < 86400 ? timeout : 10))
+        client_.connectionTimeout = timeout > 0 ? timeout : 10000
         const mine = () => self && number === self.number_
         let rejected = false
         try {
@@ -182,7 +182,7 @@ LiveFrame {
         if (end.code === ActionGoalStatus.Succeeded) {
             let why = ""
             try {
-                why = refusal ? String(refusal(end.result) || "") : Fields.refusal(end.result)
+                why = refusalOf ? String(refusalOf(end.result) || "") : Fields.refusal(end.result)
             } catch (error) {
                 why = qsTr("its result could not be judged: %1").arg(error.message)
             }

@@ -121,8 +121,8 @@ LiveFrame {
             const parts = []
             if (list.missing_.length)
                 parts.push(qsTr("no data yet: %1").arg(list.missing_.join(", ").slice(0, 200)))
-            if (alarms.uncounted)
-                parts.push(qsTr("%1 further alarms not shown").arg(alarms.uncounted))
+            if (alarms.omitted)
+                parts.push(qsTr("%1 further alarms not shown").arg(alarms.omitted))
             if (list.mute_ && list.sound)
                 parts.push(qsTr("no sound: QtWidgets is not installed"))
             return parts.join(" · ")

@@ -145,9 +145,9 @@ FocusScope {
                     transport: grid.transport
                     fillMode: grid.fillMode
                     active: cell.seen
-                    buttons: cell.isBig
+                    tools: cell.isBig
                     maxRate: cell.isBig ? 0 : grid.maxRate
-                    limit: !cell.isBig && grid.maxRate > 0 ? Math.max(0.5, 3 / grid.maxRate) : 0.5
+                    timeout: !cell.isBig && grid.maxRate > 0 ? Math.max(500, 3000 / grid.maxRate) : 500
                 }
                 MouseArea {
                     anchors { fill: parent; bottomMargin: cell.isBig ? 2 * Theme.touch : 0 }

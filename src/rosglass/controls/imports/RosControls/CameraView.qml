@@ -17,8 +17,8 @@ FocusScope {
     property string title: topic_
     // Whether it is received.
     property bool active: visible
-    // Seconds that an image is shown as live after its arrival: at 30 images a second, losing fifteen is more than a hiccup.
-    property real limit: 0.5
+    // Milliseconds after its arrival for which an image is live: at 30 images a second, losing fifteen is more than a hiccup.
+    property int timeout: 500
     // Seconds of equal images after which a camera counts as frozen; 0 for never.
     property real frozenAfter: 3
     // Milliseconds from the robot's stamp to here beyond which an image is late, or the clocks too far apart to know.
@@ -33,11 +33,11 @@ FocusScope {
     property alias maxRate: camera.throttleRate
     property alias fullResolution: camera.fullResolution
     // Whether it has buttons, for snapshot, fill mode and rotation.
-    property bool buttons: true
+    property bool tools: true
     // Whether title, rate and latency are shown while it is live.
     property bool label: true
     // Folder of snapshots.
-    property string snapshotFolder: Ros2.getEnvironmentVariable("HOME") || "/tmp"
+    property string folder: Ros2.getEnvironmentVariable("HOME") || "/tmp"
 
     // Topic to which dragging and the arrow keys send the camera's direction; empty for none.
     property string panTilt
@@ -55,12 +55,13 @@ FocusScope {
     property real fieldOfView: 1
     property real maxTurnRate: 0.5
 
-    readonly property bool live: age >= 0 && age <= limit && !camera.stale && !late && !frozen
+    readonly property bool live: fresh_ && !camera.stale && !late && !frozen
+    readonly property bool stale: !live
     readonly property bool received: age >= 0
     // Seconds since the image arrived; -1 before the first.
     readonly property real age: camera.age
-    readonly property bool late: received && age <= limit && Math.abs(latency) > maxLatency
-    readonly property bool frozen: frozenAfter > 0 && received && age <= limit && camera.unchanged >= frozenAfter
+    readonly property bool late: fresh_ && Math.abs(latency) > maxLatency
+    readonly property bool frozen: frozenAfter > 0 && fresh_ && camera.unchanged >= frozenAfter
     // Seconds during which images arrived that were all equal.
     readonly property real unchanged: camera.unchanged
     // Milliseconds from the robot's stamp to here; -1 while unknown.
@@ -81,6 +82,7 @@ FocusScope {
     signal snapshotSaved(string path)
     signal snapshotFailed(string reason)
 
+    readonly property bool fresh_: age >= 0 && 1000 * age <= timeout
     readonly property string topic_: topic ? Fields.resolve(ns, topic) : found_
     // The camera found stays while it exists: another one that appears must not take its place.
     property string found_
@@ -93,20 +95,20 @@ FocusScope {
     property string file_
     property string message_
     property bool isWrong_: false
-    readonly property string headline_: frozen ? qsTr("PICTURE FROZEN") : !late ? qsTr("NO SIGNAL")
-        : latency > 0 ? qsTr("PICTURE DELAYED") : qsTr("CLOCKS DIFFER")
+    readonly property string headline_: frozen ? qsTr("IMAGE FROZEN") : !late ? qsTr("NO SIGNAL")
+        : latency > 0 ? qsTr("IMAGE DELAYED") : qsTr("CLOCKS DIFFER")
     readonly property string detail_: frozen ? qsTr("images arrive, but have been equal for %1 s").arg(camera.unchanged.toFixed(0))
         : late ? qsTr("by %1 s").arg(Math.abs(latency / 1000).toFixed(1))
         : !topic_ ? qsTr("no camera found")
         : !received ? qsTr("no image received yet")
         : qsTr("last image %1 s old").arg(age.toFixed(1))
 
-    // Saves the image, in the camera's full resolution, to a new file in snapshotFolder.
+    // Saves the image, in the camera's full resolution, to a new file in `folder`.
     function snapshot() {
         const name = (topic_.replace(/[^A-Za-z0-9]+/g, "_").replace(/^_+|_+$/g, "") || "camera").slice(0, 80)
         const time = new Date().toISOString().replace(/[:T]/g, "-").replace("Z", "")
         note_(qsTr("saving ..."), false)
-        camera.saveSnapshot(snapshotFolder.replace(/\/+$/, "") + "/" + name + "_" + time + ".png")
+        camera.saveSnapshot(folder.replace(/\/+$/, "") + "/" + name + "_" + time + ".png")
     }
     function note_(text, isWrong) {
         message_ = text
@@ -422,7 +424,7 @@ FocusScope {
         id: tools
         anchors { right: parent.right; bottom: parent.bottom; margins: Theme.gap }
         spacing: Theme.gap / 2
-        visible: view.buttons && view.width > 3.5 * Theme.touch + 4 * Theme.gap && view.height > 2 * Theme.touch
+        visible: view.tools && view.width > 3.5 * Theme.touch + 4 * Theme.gap && view.height > 2 * Theme.touch
 
         Rectangle {
             width: saveButton.implicitWidth; height: Theme.touch; radius: Theme.radius

@@ -53,13 +53,13 @@ LiveFrame {
         name: diagnostics.title
         model: live.model
         // The worst are above: what is below is as bad only if what is hidden first is.
-        moreTint: live.uncounted ? Theme.warn : Theme.dim
+        moreTint: live.omitted ? Theme.warn : Theme.dim
         more: {
             const parts = []
             if (live.filter && live.total > view.count)
                 parts.push(qsTr("%1 filtered out").arg(live.total - view.count))
-            if (live.uncounted)
-                parts.push(qsTr("%1 reports of further parts not shown").arg(live.uncounted))
+            if (live.omitted)
+                parts.push(qsTr("%1 reports of further parts not shown").arg(live.omitted))
             if (live.lost)
                 parts.push(qsTr("%1 messages lost").arg(live.lost))
             return parts.join(" · ")

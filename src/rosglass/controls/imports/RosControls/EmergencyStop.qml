@@ -8,6 +8,7 @@ import QtQuick 2.15
 import QtQuick.Window 2.15
 import Ros2 1.0
 import RosControls 1.0
+import "fields.js" as Fields
 import "stops.js" as Stops
 
 Item {
@@ -107,10 +108,6 @@ Item {
         unlock.progress = 0
     }
 
-    function within_(name) {
-        return !ns || name.startsWith("/") || name.startsWith("~") ? name : (ns.endsWith("/") ? ns : ns + "/") + name
-    }
-
     function begin_() {
         overdue = false
         sent = 0
@@ -133,7 +130,7 @@ Item {
 
     function publish_() {
         let to = publisher_, data = wanted
-        if (wanted === false && (counter_.message !== undefined || Ros2.getPublishersInfo(within_(counterTopic)).length > 0)) {
+        if (wanted === false && (counter_.message !== undefined || Ros2.getPublishersInfo(Fields.resolve(ns, counterTopic)).length > 0)) {
             if (named_ === null) {
                 problem = qsTr("the robot's counter was unknown")
                 return
@@ -153,7 +150,7 @@ Item {
         // An answer that is late is not waited for.
         if (Date.now() - calledAt_ >= 0 && Date.now() - calledAt_ < 500)
             return
-        const name = within_(wanted || !releaseService ? service : releaseService)
+        const name = Fields.resolve(ns, wanted || !releaseService ? service : releaseService)
         const known = Ros2.getServiceTypes(name)
         const type = serviceType || known[0] || (releaseService ? "std_srvs/srv/Trigger" : "std_srvs/srv/SetBool")
         const switches = type.endsWith("/SetBool")
@@ -221,8 +218,8 @@ Item {
         call_ += 1
         clients_ = ({})
         problem = lost ? qsTr("the stop of the last robot was not confirmed") : ""
-        publisher_ = service ? null : Ros2.createPublisher(within_(topic), "std_msgs/msg/Bool", 10)
-        releasePublisher_ = service ? null : Ros2.createPublisher(within_(releaseTopic), "std_msgs/msg/UInt32", Ros2.CommandQoS())
+        publisher_ = service ? null : Ros2.createPublisher(Fields.resolve(ns, topic), "std_msgs/msg/Bool", 10)
+        releasePublisher_ = service ? null : Ros2.createPublisher(Fields.resolve(ns, releaseTopic), "std_msgs/msg/UInt32", Ros2.CommandQoS())
     }
 
     Component.onCompleted: {

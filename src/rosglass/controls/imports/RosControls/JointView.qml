@@ -80,8 +80,8 @@ LiveFrame {
                 parts.push(qsTr("limits: %1").arg(live.limitsProblem))
             else if (live.limited < joints.total)
                 parts.push(qsTr("%1 without limits").arg(joints.total - live.limited))
-            if (live.uncounted)
-                parts.push(qsTr("%1 further joints not shown").arg(live.uncounted))
+            if (live.omitted)
+                parts.push(qsTr("%1 further joints not shown").arg(live.omitted))
             return parts.join(" · ")
         }
         delegate: Item {

@@ -11,8 +11,8 @@ LiveFrame {
     property string ns
     // Whether the message can be edited and published.
     property bool editable: false
-    // Updates per second.
-    property int rate: 10
+    // Updates per second at most.
+    property int maxRate: 10
     // Path of the current row, as Plot takes it: "/odom:twist.twist.linear.x"; empty if it has no number.
     readonly property string path: tree.current && messages.rows ? messages.rows.value(messages.rows.find(tree.current), "path") || "" : ""
     readonly property bool editing: messages.editing
@@ -66,7 +66,7 @@ LiveFrame {
         id: messages
         topic: view.topic
         ns: view.ns
-        throttleRate: Math.max(1, view.rate)
+        throttleRate: Math.max(1, view.maxRate)
         onEditingChanged: if (!editing) view.publisher_ = null
     }
     ThemeText {

@@ -3,6 +3,7 @@
 import QtQuick 2.15
 import Ros2 1.0
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: modeSwitch
@@ -14,7 +15,7 @@ LiveFrame {
     // Services (std_srvs/Trigger) that request the modes, with %1 for the mode, instead of `topic`.
     property string service
     // A lifecycle node, instead of topics.
-    property string node
+    property string nodeName
     // What there is to choose from: texts, or {value, text}; a lifecycle node's are known.
     property var modes: []
     // Type of `topic`; empty for what its subscribers have, or std_msgs/String.
@@ -25,7 +26,7 @@ LiveFrame {
     property string obstacle
 
     // The mode that the robot confirms; undefined while unknown.
-    readonly property var confirmed: node ? state_ : live.message !== undefined ? live.message.data : undefined
+    readonly property var confirmed: nodeName ? state_ : live.message !== undefined ? live.message.data : undefined
     // The mode that was requested and is not confirmed yet; undefined without one.
     property var requested: undefined
     readonly property bool pending: requested !== undefined
@@ -42,7 +43,7 @@ LiveFrame {
         inactive: { unconfigured: [2, "unconfigured"], active: [3, "active"], finalized: [6, "finalized"] },
         active: { inactive: [4, "inactive"], unconfigured: [4, "inactive"], finalized: [7, "finalized"] }
     })
-    readonly property var choices_: (node ? lifecycle_ : modes).map(function(one) {
+    readonly property var choices_: (nodeName ? lifecycle_ : modes).map(function(one) {
         return one !== null && typeof one === "object" ? { value: one.value, text: String(one.text === undefined ? one.value : one.text) }
             : { value: one, text: String(one) }
     })
@@ -62,10 +63,10 @@ LiveFrame {
     property bool complete_: false
 
     title: qsTr("Mode")
-    source: node ? null : live
-    stale: node ? state_ === undefined || age_ > 3.5 : live.stale
-    age: node ? age_ : live.age
-    problem: node ? unreachable_ : live.problem
+    source: nodeName ? null : live
+    stale: nodeName ? state_ === undefined || age_ > 3.5 : live.stale
+    age: nodeName ? age_ : live.age
+    problem: nodeName ? unreachable_ : live.problem
     note: confirmed === undefined ? "" : text_(confirmed)
     contentWidth: 240 * Theme.size
     contentHeight: column.height
@@ -74,10 +75,6 @@ LiveFrame {
     function text_(value) {
         const one = choices_.find(function(one) { return one.value === value })
         return one ? one.text : String(value).slice(0, 60)
-    }
-
-    function within_(name) {
-        return !ns || name.startsWith("/") || name.startsWith("~") ? name : (ns.endsWith("/") ? ns : ns + "/") + name
     }
 
     // Request a mode; what is shown changes when the robot confirms it.
@@ -91,7 +88,7 @@ LiveFrame {
         requested = value
         late.restart()
         try {
-            if (node)
+            if (nodeName)
                 step_()
             else if (service)
                 call_(value)
@@ -117,7 +114,7 @@ LiveFrame {
     }
 
     function publish_(value) {
-        const topic = within_(modeSwitch.topic)
+        const topic = Fields.resolve(ns, modeSwitch.topic)
         const announced = Ros2.getSubscriptionsInfo(topic).map(function(one) { return one.type })
         const known = [type, announced[0], live.messageType].find(function(one) { return one })
         const kind = known || (typeof value === "number" ? "std_msgs/msg/Int32" : "std_msgs/msg/String")
@@ -134,7 +131,7 @@ LiveFrame {
     }
 
     function call_(value) {
-        const name = within_(service.arg(value)), turn = turn_
+        const name = Fields.resolve(ns, service.arg(value)), turn = turn_
         if (!clients_[name]) {
             clients_[name] = Ros2.createServiceClient(name, "std_srvs/srv/Trigger")
             clients_[name].connectionTimeout = 0
@@ -161,8 +158,8 @@ LiveFrame {
         publisher_ = null
         clients_ = ({})
         late.stop()
-        getState_ = node ? Ros2.createServiceClient(within_(node) + "/get_state", "lifecycle_msgs/srv/GetState") : null
-        changeState_ = node ? Ros2.createServiceClient(within_(node) + "/change_state", "lifecycle_msgs/srv/ChangeState") : null
+        getState_ = nodeName ? Ros2.createServiceClient(Fields.resolve(ns, nodeName) + "/get_state", "lifecycle_msgs/srv/GetState") : null
+        changeState_ = nodeName ? Ros2.createServiceClient(Fields.resolve(ns, nodeName) + "/change_state", "lifecycle_msgs/srv/ChangeState") : null
         if (getState_)
             getState_.connectionTimeout = 1500
         if (changeState_)
@@ -218,7 +215,7 @@ LiveFrame {
             if (turn !== modeSwitch.turn_)
                 return
             if (!answer.success)
-                modeSwitch.refuse_(qsTr("refused: %1 did not become %2").arg(modeSwitch.node).arg(next[1]))
+                modeSwitch.refuse_(qsTr("refused: %1 did not become %2").arg(modeSwitch.nodeName).arg(next[1]))
             else if (modeSwitch.requested !== undefined && next[1] !== modeSwitch.requested) {
                 modeSwitch.take_(next[1])
                 modeSwitch.step_()
@@ -233,7 +230,7 @@ LiveFrame {
         complete_ = true
         connect_()
     }
-    onNodeChanged: connect_()
+    onNodeNameChanged: connect_()
     onNsChanged: connect_()
     onTopicChanged: connect_()
     onServiceChanged: connect_()
@@ -242,7 +239,7 @@ LiveFrame {
 
     LiveTopic {
         id: live
-        enabled: modeSwitch.node === ""
+        enabled: modeSwitch.nodeName === ""
         topic: modeSwitch.stateTopic
         ns: modeSwitch.ns
         types: ["std_msgs/msg/String"].concat(modeSwitch.integers_)
@@ -250,8 +247,8 @@ LiveFrame {
         timeout: 0
     }
     LiveTopic {
-        enabled: modeSwitch.node !== ""
-        topic: modeSwitch.node + "/transition_event"
+        enabled: modeSwitch.nodeName !== ""
+        topic: modeSwitch.nodeName + "/transition_event"
         ns: modeSwitch.ns
         types: ["lifecycle_msgs/msg/TransitionEvent"]
         onMessageChanged: modeSwitch.ask_()
@@ -259,7 +256,7 @@ LiveFrame {
     Timer {
         interval: 1000
         repeat: true
-        running: modeSwitch.node !== ""
+        running: modeSwitch.nodeName !== ""
         onTriggered: {
             if (modeSwitch.stateAt_ > 0 && modeSwitch.state_ !== undefined)
                 modeSwitch.age_ = Math.max(0, (Date.now() - modeSwitch.stateAt_) / 1000)

@@ -12,9 +12,9 @@ LiveFrame {
     // Names of nodes and topics that are left out.
     property alias hide: graph.hide
     // Whether hidden names are included, such as topics of actions.
-    property alias hidden: graph.hidden
+    property alias showHidden: graph.showHidden
     // Whether topics are shown; otherwise nodes are connected directly.
-    property alias topics: graph.topics
+    property alias showTopics: graph.showTopics
     // Name of the selected node or topic; empty for none.
     readonly property string selected: selected_.substring(selected_.indexOf(" ") + 1)
 

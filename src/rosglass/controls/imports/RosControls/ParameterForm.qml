@@ -9,7 +9,7 @@ LiveFrame {
     id: form
 
     // Full name of the node, in ROS 1 any namespace of the parameter server; without one, the operator chooses.
-    property string node
+    property string nodeName
     // Part of a name; only parameters whose names contain it are shown.
     property string filter
     // Lists of values by parameter name, for parameters whose descriptors do not list them.
@@ -22,7 +22,7 @@ LiveFrame {
     readonly property int total: parameters.total
     // The change that undo() reverts, in words; empty without one.
     readonly property string undoText: parameters.undoText
-    readonly property string node_: node || picked_
+    readonly property string node_: nodeName || picked_
     property string picked_
     property var nodes_: []
 
@@ -37,7 +37,7 @@ LiveFrame {
     function list_() { nodes_ = Ros2.queryNodes().filter(name => name !== own_()) }
     function own_() { return (Ros2.getNamespace().replace(/\/$/, "") || "") + "/" + Ros2.getName() }
 
-    title: node ? qsTr("Parameters of %1").arg(node) : qsTr("Parameters")
+    title: nodeName ? qsTr("Parameters of %1").arg(nodeName) : qsTr("Parameters")
     source: null
     stale: node_ !== "" && !ready
     age: total ? 0 : -1
@@ -54,11 +54,11 @@ LiveFrame {
         onRejected: function(name, reason) { form.rejected(name, reason) }
     }
     Connections {
-        target: form.node ? null : Ros2
+        target: form.nodeName ? null : Ros2
         function onGraphChanged() { form.list_() }
         function onInitialized() { form.list_() }
     }
-    Component.onCompleted: if (!node) list_()
+    Component.onCompleted: if (!nodeName) list_()
 
     Row {
         id: head
@@ -70,7 +70,7 @@ LiveFrame {
             id: picker
             objectName: "picker"
             width: parent.width * 0.4
-            visible: form.node === ""
+            visible: form.nodeName === ""
             name: qsTr("Node")
             model: form.nodes_
             currentIndex: form.nodes_.indexOf(form.picked_)

@@ -18,11 +18,11 @@ Item {
     // Whether it is called only after the button has been held down, for `holdTime` seconds.
     property bool hold: false
     property real holdTime: 1
-    // Seconds to wait for the answer; a call from code waits as long for a server.
-    property real timeout: 10
+    // Milliseconds to wait for the answer; a call from code waits as long for a server.
+    property int timeout: 10000
     property color tint: hold ? Theme.warn : Theme.accent
     // Returns why the server refused, by its response; empty if it did not.
-    property var refusal: null
+    property var refusalOf: null
 
     // Whether a server is available, and whether it has been called and has not answered yet.
     readonly property bool ready: client_ !== null && client_.ready
@@ -71,7 +71,7 @@ Item {
         outcome_ = said_ = ""
         response_ = undefined
         limit.restart()
-        client_.connectionTimeout = Math.round(1000 * limit_)
+        client_.connectionTimeout = limit_
         let promise
         try {
             promise = client_.call(request === undefined || request === null ? {} : request)
@@ -84,14 +84,14 @@ Item {
             function (error) { if (self && number === self.number_) self.fail_(error.message) })
     }
 
-    readonly property real limit_: timeout > 0 && timeout < 86400 ? timeout : 10
+    readonly property int limit_: timeout > 0 ? timeout : 10000
 
     function take_(response) {
         end_()
         response_ = response
         let why = ""
         try {
-            why = refusal ? String(refusal(response) || "") : Fields.refusal(response)
+            why = refusalOf ? String(refusalOf(response) || "") : Fields.refusal(response)
         } catch (error) {
             why = qsTr("its answer could not be judged: %1").arg(error.message)
         }
@@ -134,11 +134,11 @@ Item {
 
     Timer {
         id: limit
-        interval: 1000 * control.limit_
+        interval: control.limit_
         onTriggered: {
             const was = control.ready
-            const reason = was ? qsTr("no answer within %1 s; the robot may still do it").arg(control.limit_)
-                : qsTr("no server of %1 within %2 s").arg(control.name_).arg(control.limit_)
+            const reason = was ? qsTr("no answer within %1 s; the robot may still do it").arg(control.limit_ / 1000)
+                : qsTr("no server of %1 within %2 s").arg(control.name_).arg(control.limit_ / 1000)
             // Before the requests are cancelled, which reports another reason.
             control.fail_(reason)
             control.client_.cancelRequests()

@@ -11,7 +11,7 @@ LiveFrame {
     // Namespace of the topics; empty for all.
     property string ns
     // Whether hidden topics are included, such as those of actions.
-    property bool hidden: false
+    property bool showHidden: false
     // Whether rate and size of unfolded topics are measured, for which they are received.
     property bool measures: true
     // The topic of the current row; empty for a namespace.
@@ -35,7 +35,7 @@ LiveFrame {
     TopicRows {
         id: topics
         ns: view.ns
-        hidden: view.hidden
+        showHidden: view.showHidden
         filter: view.filter
     }
     ThemeField {
