@@ -164,7 +164,7 @@ def pyqtgraph(plan: dict[str, Any]) -> None:
     import numpy as np
     import pyqtgraph as pg
 
-    from rosglass.controls.plot_samples import Samples
+    from rosglass.controls.plots.samples import Samples
     from rosglass.qt import QtCore
 
     app = pg.mkQApp()
@@ -220,7 +220,7 @@ def zoom(_plan: dict[str, Any]) -> None:
     """Recompute all columns at 3840 pixels, and weigh the store."""
     import numpy as np
 
-    from rosglass.controls.plot_samples import Columns, Samples
+    from rosglass.controls.plots.samples import Columns, Samples
 
     count = HISTORY_S * HZ
     times = np.arange(count, dtype=np.int64) * 1_000_000
@@ -244,7 +244,7 @@ def zoom(_plan: dict[str, Any]) -> None:
 def receive(plan: dict[str, Any]) -> None:
     """Receive 20 topics, by a plot's receiver or by callbacks."""
     import rosglass
-    from rosglass.controls.plot_series import FieldFeed, PlotReceiver, TopicFeed
+    from rosglass.controls.plots.series import FieldFeed, PlotReceiver, TopicFeed
 
     node = rosglass.connect(plan["url"], "screen")
     names = plan["topics"]

@@ -397,7 +397,7 @@ def let_go(screen: Screen, robot: Robot, way: Way) -> Outcome:
 
 def main(file: str, url: str) -> int:
     """Show the screen, and run the lines of the standard input on the GUI thread."""
-    from rosglass.controls import command_sender
+    from rosglass.controls.steering import command_sender
     from rosglass.qml import Application
     from rosglass.qt import QtCore, QtGui
 

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from rosglass.controls.layered_layout import Layout, lay_out
+from rosglass.controls.lists.layered_layout import Layout, lay_out
 
 
 def crossings(layout: Layout) -> int:

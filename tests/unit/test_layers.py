@@ -45,7 +45,10 @@ RANK = {
     "demo": 13,
 }
 #: The folders of a large package, from the lowest; each imports itself and those before it.
-ROOMS = {"qml": ["engine", "elements", "run"]}
+ROOMS = {
+    "qml": ["engine", "elements", "run"],
+    "controls": ["topics", "lists", "steering", "maps", "plots"],
+}
 QT = {"PySide6", "PySide2", "PyQt5", "PyQt6", "shiboken6", "shiboken2"}
 MODULES = sorted(ROOT.rglob("*.py"))
 

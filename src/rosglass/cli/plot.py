@@ -14,15 +14,15 @@ import numpy as np
 from rosglass.cli.connecting import End, connect
 from rosglass.cli.output import CLEAR_REST, HOME, Style, note, require_reader
 from rosglass.comm import anonymous_name
-from rosglass.controls.plot_axes import Axis, number_text
-from rosglass.controls.plot_raster import Raster, background, outline
-from rosglass.controls.plot_series import FieldFeed, PlotReceiver, TopicFeed, split_path
+from rosglass.controls.plots.axes import Axis, number_text
+from rosglass.controls.plots.raster import Raster, background, outline
+from rosglass.controls.plots.series import FieldFeed, PlotReceiver, TopicFeed, split_path
 
 if TYPE_CHECKING:
     import argparse
 
     from rosglass.comm import Node
-    from rosglass.controls.plot_samples import Samples
+    from rosglass.controls.plots.samples import Samples
 
 __all__ = ["TextPlot", "run"]
 

@@ -5,28 +5,28 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from rosglass.controls.alarms import Alarms
-from rosglass.controls.diagnostics import DiagnosticsTopic
-from rosglass.controls.gamepad import Gamepad
-from rosglass.controls.geo_scene import GeoScene
-from rosglass.controls.graph_layout import GraphLayout
-from rosglass.controls.graph_watch import GraphWatch
-from rosglass.controls.joints import JointTopic
-from rosglass.controls.live_topic import LiveTopic
-from rosglass.controls.live_value import LiveValue
-from rosglass.controls.log_topic import LogTopic
-from rosglass.controls.map_camera import MapCamera
-from rosglass.controls.map_marks import MapArrow, MapMarks
-from rosglass.controls.map_scene import MapScene
-from rosglass.controls.message_rows import MessageRows
-from rosglass.controls.node_parameters import NodeParameters
-from rosglass.controls.plot import PlotData, PlotSeries
-from rosglass.controls.plot_lines import PlotLines
-from rosglass.controls.tf_rows import TfRows
-from rosglass.controls.topic_recorder import TopicRecorder
-from rosglass.controls.topic_rows import TopicRows
-from rosglass.controls.twist_command import TwistCommand
-from rosglass.controls.window_keys import WindowKeys
+from rosglass.controls.lists.alarms import Alarms
+from rosglass.controls.lists.diagnostics import DiagnosticsTopic
+from rosglass.controls.lists.graph_layout import GraphLayout
+from rosglass.controls.lists.joints import JointTopic
+from rosglass.controls.lists.log_topic import LogTopic
+from rosglass.controls.lists.message_rows import MessageRows
+from rosglass.controls.lists.node_parameters import NodeParameters
+from rosglass.controls.lists.tf_rows import TfRows
+from rosglass.controls.lists.topic_rows import TopicRows
+from rosglass.controls.maps.camera import MapCamera
+from rosglass.controls.maps.geo_scene import GeoScene
+from rosglass.controls.maps.marks import MapArrow, MapMarks
+from rosglass.controls.maps.scene import MapScene
+from rosglass.controls.plots.lines import PlotLines
+from rosglass.controls.plots.plot import PlotData, PlotSeries
+from rosglass.controls.steering.gamepad import Gamepad
+from rosglass.controls.steering.twist_command import TwistCommand
+from rosglass.controls.steering.window_keys import WindowKeys
+from rosglass.controls.topics.graph_watch import GraphWatch
+from rosglass.controls.topics.live_topic import LiveTopic
+from rosglass.controls.topics.live_value import LiveValue
+from rosglass.controls.topics.topic_recorder import TopicRecorder
 from rosglass.qml.run.modules import register_class
 
 if TYPE_CHECKING:

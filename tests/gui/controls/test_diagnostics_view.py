@@ -160,7 +160,7 @@ def test_rows_stay_in_view_while_others_change(shown: Any, controls: Any, wait: 
 
 def test_model_shows_any_change(controls: Any) -> None:
     """The steps of a RowModel give the order that was asked for, as a view counts them."""
-    from rosglass.controls.row_model import RowModel
+    from rosglass.controls.lists.row_model import RowModel
     from rosglass.qt import QtCore
 
     chance = random.Random(1)

@@ -24,7 +24,7 @@ from virtual_pads import (
     VirtualPad,
 )
 
-from rosglass.controls.gamepad_devices import devices, parse_element, smooth
+from rosglass.controls.steering.gamepad_devices import devices, parse_element, smooth
 from rosglass.qt import QtGui
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from rosglass.controls.geo_tiles import from_mercator, open_tiles, to_mercator
+from rosglass.controls.maps.geo_tiles import from_mercator, open_tiles, to_mercator
 from rosglass.errors import Error
 from rosglass.qt import QtCore, QtGui
 
@@ -179,7 +179,7 @@ def test_moving_the_map_by_hand_ends_following(controls: Any, wait: Callable[...
 
 
 def test_missing_tiles_are_parts_of_coarser_ones(tmp_path: Path) -> None:
-    from rosglass.controls.map_tiles import TileKey
+    from rosglass.controls.maps.tiles import TileKey
 
     path = mbtiles_of(
         tmp_path / "a.mbtiles",
@@ -205,7 +205,7 @@ def test_missing_tiles_are_parts_of_coarser_ones(tmp_path: Path) -> None:
 
 
 def test_hostile_tiles_are_refused(tmp_path: Path) -> None:
-    from rosglass.controls.map_tiles import TileKey
+    from rosglass.controls.maps.tiles import TileKey
 
     bad = {(1, 0, 0): b"not an image", (1, 1, 0): tile("#ff0000", 2048), (1, 0, 1): bytes(5 << 20)}
     folder_of(tmp_path, bad)

@@ -64,7 +64,7 @@ def test_frames_of_two_nodes(live_controls: Any, wait: Any) -> None:
 
 
 def test_graph_of_nodes(live_controls: Any, wait: Any) -> None:
-    from rosglass.controls.graph_layout import GraphLayout
+    from rosglass.controls.lists.graph_layout import GraphLayout
 
     live_controls.robot.create_publisher("/image", STRING)
     live_controls.robot.create_subscription("/image", STRING)

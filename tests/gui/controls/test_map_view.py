@@ -159,7 +159,7 @@ def test_scan_waits_for_its_transform_and_is_drawn(
 
 
 def test_camera_keeps_the_point_under_the_pointer_and_its_limits(controls: Any) -> None:
-    from rosglass.controls.map_camera import MapCamera
+    from rosglass.controls.maps.camera import MapCamera
 
     camera = MapCamera()
     camera.width, camera.height = 800.0, 600.0

@@ -13,7 +13,7 @@ pytestmark = pytest.mark.both_qt
 
 def graph(controls: Any) -> Any:
     """Return the GraphLayout of the control."""
-    from rosglass.controls.graph_layout import GraphLayout
+    from rosglass.controls.lists.graph_layout import GraphLayout
 
     return controls.window.findChildren(GraphLayout)[0]
 

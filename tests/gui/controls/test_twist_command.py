@@ -10,7 +10,7 @@ import pytest
 from waiting import nothing_happens
 
 from rosglass.comm.graph import ConnectionState
-from rosglass.controls import command_sender
+from rosglass.controls.steering import command_sender
 
 if TYPE_CHECKING:
     from collections.abc import Callable

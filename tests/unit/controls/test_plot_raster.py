@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rosglass.controls.plot_raster import Curve, Raster, background, outline
+from rosglass.controls.plots.raster import Curve, Raster, background, outline
 
 WIDTH, HEIGHT = 60, 40
 EMPTY, COLORS = 0, np.array([1, 2, 3], np.uint32)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rosglass.controls.plot_samples import BLOCK_SIZE, MAX_RUNS, Columns, Samples
+from rosglass.controls.plots.samples import BLOCK_SIZE, MAX_RUNS, Columns, Samples
 
 SECOND = 1_000_000_000
 MS = 1_000_000

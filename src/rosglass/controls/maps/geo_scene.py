@@ -7,9 +7,15 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.executor import Dispatcher
-from rosglass.controls.geo_tiles import EARTH_M, GeoTiles, from_mercator, open_tiles, to_mercator
-from rosglass.controls.map_camera import MapCamera, Plane, Track
-from rosglass.controls.map_tiles import TileImages, TileLayer
+from rosglass.controls.maps.camera import MapCamera, Plane, Track
+from rosglass.controls.maps.geo_tiles import (
+    EARTH_M,
+    GeoTiles,
+    from_mercator,
+    open_tiles,
+    to_mercator,
+)
+from rosglass.controls.maps.tiles import TileImages, TileLayer
 from rosglass.errors import Error
 from rosglass.qml.elements.element import Element
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
@@ -17,7 +23,7 @@ from rosglass.qml.engine.session import GuiExecutor, result_of, weak_callback
 from rosglass.qt import Property, QtCore, QtGui, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
-    from rosglass.controls.map_layers import MapLayer
+    from rosglass.controls.maps.layers import MapLayer
 
 __all__ = ["GeoScene"]
 
@@ -139,7 +145,7 @@ class GeoScene(Element):
         wanted = [str(topic) for topic in self.paths] if self.node is not None else []
         if wanted == [*self._layers]:
             return
-        from rosglass.controls.map_layers import GeoPathLayer  # noqa: PLC0415 - numpy takes 70 ms
+        from rosglass.controls.maps.layers import GeoPathLayer  # noqa: PLC0415 - numpy takes 70 ms
 
         before, self._layers = self._layers, {}
         for topic in wanted:

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rosglass.controls import plot_raster
-from rosglass.controls.plot_axes import Axis
-from rosglass.controls.plot_raster import Curve, outline
-from rosglass.controls.plot_samples import Columns
+from rosglass.controls.plots import raster as plot_raster
+from rosglass.controls.plots.axes import Axis
+from rosglass.controls.plots.raster import Curve, outline
+from rosglass.controls.plots.samples import Columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from rosglass.controls.plot_lines import PlotLines
-    from rosglass.controls.plot_samples import Samples
+    from rosglass.controls.plots.lines import PlotLines
+    from rosglass.controls.plots.samples import Samples
 
     Numbers = NDArray[np.float64]
 

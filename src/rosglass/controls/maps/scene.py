@@ -7,8 +7,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.executor import Dispatcher
-from rosglass.controls.map_camera import MapCamera, Plane, Track
-from rosglass.controls.map_tiles import TileImages
+from rosglass.controls.maps.camera import MapCamera, Plane, Track
+from rosglass.controls.maps.tiles import TileImages
 from rosglass.errors import Error
 from rosglass.interfaces.names import ros1_name
 from rosglass.qml.elements.element import Element
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from rosglass.comm.node import Node
-    from rosglass.controls.map_layers import MapLayer
+    from rosglass.controls.maps.layers import MapLayer
     from rosglass.tf import TransformBuffer
 
 __all__ = ["MapScene"]
@@ -214,13 +214,13 @@ class MapScene(Element):
         self.changed()
 
     def _new_layer(self, kind: str, topic: str) -> MapLayer:
-        from rosglass.controls.map_layers import LAYERS  # noqa: PLC0415 - numpy takes 70 ms
+        from rosglass.controls.maps.layers import LAYERS  # noqa: PLC0415 - numpy takes 70 ms
 
         return LAYERS[kind](self, topic)
 
     def _select(self, node: Node) -> list[tuple[str, str]]:
         """Return kind and topic of the wanted layers, those at the bottom first."""
-        from rosglass.controls.map_layers import LAYERS  # noqa: PLC0415 - as above
+        from rosglass.controls.maps.layers import LAYERS  # noqa: PLC0415 - as above
 
         lists = {
             "map": [self.topic or _ALL],
@@ -361,7 +361,7 @@ class MapScene(Element):
         self.repaint.emit()
 
     def _place_robot(self, buffer: TransformBuffer, fixed: str) -> None:
-        from rosglass.controls.map_layers import place_of  # noqa: PLC0415 - as above
+        from rosglass.controls.maps.layers import place_of  # noqa: PLC0415 - as above
 
         self._lost = ""
         if not self.robotFrame:

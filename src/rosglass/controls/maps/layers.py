@@ -1,7 +1,7 @@
 """The layers of a map: occupancy grids in tiles, and scans, paths, outlines and particles.
 
 A worker thread reads the messages into numpy arrays; the GUI thread places them by their transforms
-and paints them. :class:`~rosglass.controls.map_scene.MapScene` creates the layers.
+and paints them. :class:`~rosglass.controls.maps.scene.MapScene` creates the layers.
 """
 # ruff: noqa: N815 - the names of properties are QML's
 
@@ -16,10 +16,10 @@ import numpy as np
 
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.comm.time import Time
-from rosglass.controls.geo_tiles import to_mercator
-from rosglass.controls.map_camera import Plane
-from rosglass.controls.map_grid import GridReader, theme_colors
-from rosglass.controls.map_tiles import TileLayer
+from rosglass.controls.maps.camera import Plane
+from rosglass.controls.maps.geo_tiles import to_mercator
+from rosglass.controls.maps.grid import GridReader, theme_colors
+from rosglass.controls.maps.tiles import TileLayer
 from rosglass.errors import Error, TransformException
 from rosglass.images.grid_colors import grid_colors
 from rosglass.qml.elements.element import TopicElement
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rosglass.controls.map_grid import GridChange
+    from rosglass.controls.maps.grid import GridChange
     from rosglass.tf import TransformBuffer
 
 __all__ = ["LAYERS", "Canvas", "GridLayer", "MapLayer", "VectorLayer"]
@@ -487,7 +487,7 @@ class Canvas:
 
 
 class VectorLayer(MapLayer):
-    """Points or lines that :class:`~rosglass.controls.map_marks.MapMarks` paints.
+    """Points or lines that :class:`~rosglass.controls.maps.marks.MapMarks` paints.
 
     Attributes:
         READ: Reads a message.

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rosglass.controls.in_front import find_item
+from rosglass.controls.steering.in_front import find_item
 from rosglass.qml.elements.image_sinks import window_of
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
 from rosglass.qt import QtCore, QtGui, QtQuick, Signal, Slot, is_alive

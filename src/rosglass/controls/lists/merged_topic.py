@@ -8,8 +8,8 @@ from collections import deque
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.qos import QoS, Reliability
-from rosglass.controls.live_topic import LiveTopic
-from rosglass.controls.row_model import RowModel
+from rosglass.controls.lists.row_model import RowModel
+from rosglass.controls.topics.live_topic import LiveTopic
 from rosglass.qml.elements.element import single_shot
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import QtCore, Slot, is_valid

@@ -12,9 +12,9 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import QoS
-from rosglass.controls.gamepad_devices import Element as Control
-from rosglass.controls.gamepad_devices import Pad, Snapshot, devices, parse_element
-from rosglass.controls.in_front import find_item, obstruction
+from rosglass.controls.steering.gamepad_devices import Element as Control
+from rosglass.controls.steering.gamepad_devices import Pad, Snapshot, devices, parse_element
+from rosglass.controls.steering.in_front import find_item, obstruction
 from rosglass.errors import Error
 from rosglass.qml.elements.element import Element
 from rosglass.qml.engine.dialect import resolve_namespace, within_namespace

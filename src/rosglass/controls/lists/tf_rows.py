@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.controls.rows import Rows, copy_text, plain_line
+from rosglass.controls.lists.rows import Rows, copy_text, plain_line
 from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS
 from rosglass.qml.elements.tf_buffer import TfBuffer
 from rosglass.qml.engine.properties import ReadOnly, Writable, at_least, report

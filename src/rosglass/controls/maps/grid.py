@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rosglass.controls.map_tiles import TILE_PX, TileKey
+from rosglass.controls.maps.tiles import TILE_PX, TileKey
 from rosglass.errors import Error
 from rosglass.images.grid_colors import grid_colors
 from rosglass.qt import QtGui

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.controls.plot_axes import clock_text, number_text, time_ticks
+from rosglass.controls.plots.axes import clock_text, number_text, time_ticks
 from rosglass.errors import Error
 from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS, Element
 from rosglass.qml.engine.dialect import resolve_namespace, within_namespace
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from rosglass.comm.node import Node
-    from rosglass.controls.plot_frame import PlotFrame, ShownLine
-    from rosglass.controls.plot_samples import Samples
-    from rosglass.controls.plot_series import FieldFeed, PlotReceiver, TopicFeed
+    from rosglass.controls.plots.frame import PlotFrame, ShownLine
+    from rosglass.controls.plots.samples import Samples
+    from rosglass.controls.plots.series import FieldFeed, PlotReceiver, TopicFeed
     from rosglass.qml.engine.runtime import Runtime
 
 __all__ = ["MAX_LINES", "PlotData", "PlotSeries"]
@@ -214,7 +214,8 @@ class PlotData(Element):
     ) -> None:
         super().__init__(parent, runtime)
         # Numpy takes 0.1 s, which interfaces without a plot need not wait for.
-        from rosglass.controls import plot_frame, plot_series  # noqa: PLC0415
+        from rosglass.controls.plots import frame as plot_frame  # noqa: PLC0415
+        from rosglass.controls.plots import series as plot_series  # noqa: PLC0415
 
         self._frames, self._kit = plot_frame, plot_series
         self._namespace = ""

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from sqlite3 import Connection
 
-    from rosglass.controls.map_tiles import TileKey
+    from rosglass.controls.maps.tiles import TileKey
 
 __all__ = ["EARTH_M", "GeoTiles", "from_mercator", "open_tiles", "to_mercator"]
 
@@ -45,7 +45,7 @@ def from_mercator(x: float, y: float) -> tuple[float, float]:
 
 
 class GeoTiles:
-    """Tiles of the Earth; a :class:`~rosglass.controls.map_tiles.TileSource` in Mercator metres.
+    """Tiles of the Earth; a :class:`~rosglass.controls.maps.tiles.TileSource` in Mercator metres.
 
     Args:
         read: Returns the file of zoom, column and row (from the north); None if it is missing.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from rosglass.controls.live_topic import LiveTopic
+from rosglass.controls.topics.live_topic import LiveTopic
 from rosglass.errors import FieldPathError
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
 from rosglass.qt import Slot

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.comm.qos import Durability, History, QoS, Reliability
-from rosglass.controls.plot_samples import Samples
+from rosglass.controls.plots.samples import Samples
 from rosglass.errors import Error, FieldPathError, TypeNotFoundError
 from rosglass.interfaces.names import ros1_name
 from rosglass.messages.message import parse_path, resolve_path
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
     from rosglass.comm.subscription import Subscription
-    from rosglass.controls.plot_samples import Times
+    from rosglass.controls.plots.samples import Times
     from rosglass.messages import MessageType
 
 __all__ = ["MAX_ELEMENTS", "FieldFeed", "PlotReceiver", "TopicFeed", "split_path"]

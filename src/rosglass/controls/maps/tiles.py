@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from rosglass.comm.handle import Executor
-    from rosglass.controls.map_camera import MapCamera, Plane
+    from rosglass.controls.maps.camera import MapCamera, Plane
     from rosglass.qt import QtQml
 
 __all__ = ["TILE_PX", "TileImages", "TileKey", "TileLayer", "TileSource"]

@@ -8,8 +8,8 @@ import struct
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.qos import QoS
-from rosglass.controls.live_topic import LiveTopic
-from rosglass.controls.rows import Rows, copy_text, plain_line
+from rosglass.controls.lists.rows import Rows, copy_text, plain_line
+from rosglass.controls.topics.live_topic import LiveTopic
 from rosglass.errors import ConversionError, Error
 from rosglass.qml.elements.message_item_model import TreeItem, check_leaf, plain_tree
 from rosglass.qml.engine.from_js import scalar_from_python

@@ -11,7 +11,7 @@ from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QtCore, QtGui, QtQuick, is_alive
 
 if TYPE_CHECKING:
-    from rosglass.controls.map_layers import Canvas
+    from rosglass.controls.maps.layers import Canvas
 
 __all__ = ["MapArrow", "MapMarks"]
 
@@ -56,7 +56,7 @@ class MapMarks(QtQuick.QQuickPaintedItem):
         if camera is None:
             return
         # Not before the first map: numpy takes 70 ms.
-        from rosglass.controls.map_layers import Canvas, VectorLayer, paint_line  # noqa: PLC0415
+        from rosglass.controls.maps.layers import Canvas, VectorLayer, paint_line  # noqa: PLC0415
 
         view = camera.to_screen()
         painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)

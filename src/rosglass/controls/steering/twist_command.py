@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from weakref import ref
 
 from rosglass.comm.qos import QoS
-from rosglass.controls.command_sender import CommandSender, Limits, Velocity
-from rosglass.controls.in_front import FocusWatch, find_item, obstruction, popup_layer
+from rosglass.controls.steering.command_sender import CommandSender, Limits, Velocity
+from rosglass.controls.steering.in_front import FocusWatch, find_item, obstruction, popup_layer
 from rosglass.errors import Error, UnsupportedError
 from rosglass.interfaces.names import join_name
 from rosglass.qml.elements.element import Element

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rosglass.controls.plot_raster import Curve, Outline, Raster
+    from rosglass.controls.plots.raster import Curve, Outline, Raster
 
 __all__ = ["PlotLines"]
 

@@ -1,0 +1,1 @@
+"""Maps of occupancy grids, and tiles of the Earth."""

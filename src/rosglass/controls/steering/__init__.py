@@ -1,0 +1,1 @@
+"""Commands to the robot, and their inputs."""

@@ -1,0 +1,1 @@
+"""Subscriptions of controls, recordings, and the graph."""
