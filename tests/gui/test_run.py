@@ -298,6 +298,30 @@ def test_a_kiosk_ignores_the_window_manager(start: Any, file: Path, screen: str)
     assert program.end() == 0
 
 
+@pytest.mark.both_qt
+@pytest.mark.xvfb
+def test_fullscreen_fills_a_screen_without_a_window_manager(
+    start: Any, file: Path, screen: str
+) -> None:
+    file.write_text(
+        """import QtQuick 2.15
+        import QtQuick.Window 2.15
+        Window {
+            visible: true; width: 320; height: 200
+            Timer {
+                running: true; interval: 600
+                onTriggered: {
+                    console.log("fills", width === Screen.width, height === Screen.height)
+                    Qt.quit()
+                }
+            }
+        }"""
+    )
+    program = start("run", file, "--fullscreen", display=screen)
+    assert program.until("fills").endswith("fills true true")
+    assert program.end() == 0
+
+
 def test_without_watch_nothing_is_reloaded(start: Any, file: Path) -> None:
     file.write_text(GOOD)
     program = start("run", file)

@@ -36,6 +36,14 @@ __all__ = ["Kiosk", "Runner", "needs_widgets"]
 _STILL = 3000
 
 
+def _screen_of(window: QtGui.QWindow) -> QtGui.QScreen:
+    """Return the screen that a window was given, or else that of its place."""
+    given, middle = window.screen(), window.geometry().center()
+    if given is not QtGui.QGuiApplication.primaryScreen():
+        return given
+    return QtGui.QGuiApplication.screenAt(middle) or given
+
+
 class Kiosk(QtCore.QObject):
     """Keeps windows open, and hides an idle pointer.
 
@@ -330,6 +338,8 @@ class Runner(QtCore.QObject):
             self._warn_not_drawn([window.contentItem() for window in windows])
         for window in wanted:
             if self._fullscreen:
+                # X11 without a window manager would leave the window as large as it is.
+                window.setGeometry(_screen_of(window).geometry())
                 window.showFullScreen()
             elif not window.isVisible():
                 window.show()
