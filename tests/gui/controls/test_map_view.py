@@ -74,6 +74,16 @@ def test_map_is_found_by_type_fitted_and_painted(
     assert view.property("scene").property("robotX") == pytest.approx(2.0)
 
 
+def test_a_standing_robot_is_followed_from_its_first_pose(
+    controls: Any, robot: Robot, wait: Callable[..., None]
+) -> None:
+    view = controls.show("MapView { anchors.fill: parent; follow: true }", 640, 480)
+    robot.start()
+    wait(lambda: view.property("scene").property("robotSeen"))
+    assert view.property("camera").property("centerX") == pytest.approx(2.0)
+    assert view.property("follow")
+
+
 def test_updates_change_only_their_tiles(
     controls: Any, robot: Robot, wait: Callable[..., None]
 ) -> None:

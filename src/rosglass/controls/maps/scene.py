@@ -374,8 +374,16 @@ class MapScene(Element):
         x, y, yaw = pose.e, pose.f, math.atan2(pose.c, pose.a)
         if (x, y, yaw) != (self.robotX, self.robotY, self.robotYaw) or not self.robotSeen:
             self.track.append(x, y)
-            report(self, robotX=x, robotY=y, robotYaw=yaw, driven=self.track.length)
-        report(self, robotKnown=not self._is_robot_old(), robotSeen=True)
+        # At once: who follows the robot moves there at its first pose, also if it stands still.
+        report(
+            self,
+            robotX=x,
+            robotY=y,
+            robotYaw=yaw,
+            driven=self.track.length,
+            robotKnown=not self._is_robot_old(),
+            robotSeen=True,
+        )
 
     def _is_robot_old(self) -> bool:
         buffer = self.buffer
