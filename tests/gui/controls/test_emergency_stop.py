@@ -93,6 +93,19 @@ def lift(controls: Any, name: str) -> None:
     test.mouseRelease(controls.window, left, none, middle(controls.find(name)))
 
 
+def test_at_the_edge_of_the_window_the_bar_stays_within_reach(
+    controls: Any, wait: Any, latch: Latch
+) -> None:
+    stop = show(controls, wait, "EmergencyStop { width: 160; height: 160 }")
+    press(controls, "mushroom")
+    lift(controls, "mushroom")
+    wait(lambda: stop.property("stopped"))
+    assert controls.find("unlock").mapToScene(QtCore.QPointF(0, 0)).y() >= 0
+    press(controls, "unlock")
+    wait(lambda: not latch.stopped)
+    lift(controls, "unlock")
+
+
 def test_a_click_stops_and_a_long_press_releases(controls: Any, wait: Any, latch: Latch) -> None:
     stop = show(controls, wait, "EmergencyStop { y: 100; width: 160; height: 160 }")
     wait(lambda: stop.property("known"))

@@ -309,6 +309,9 @@ Item {
 
     readonly property real diameter_: Math.max(0, Math.min(width, height))
 
+    onDiameter_Changed: unlock.place()
+    onYChanged: unlock.place()
+
     FocusRing {
         item: collar
         visible: stop.activeFocus
@@ -394,8 +397,14 @@ Item {
     Rectangle {
         id: unlock
         objectName: "unlock"
-        anchors { horizontalCenter: parent.horizontalCenter; bottom: collar.top; bottomMargin: Theme.gap }
+        anchors { horizontalCenter: parent.horizontalCenter; bottom: collar.top; bottomMargin: beyond ? -height : Theme.gap }
         visible: stop.blocks
+        // Whether the room above the button is outside the window, where no finger reaches it.
+        property bool beyond: false
+        function place() {
+            beyond = stop.mapToItem(null, 0, stop.height - stop.diameter_ - Theme.gap - height).y < 0
+        }
+        onVisibleChanged: place()
         width: Math.min(190 * Theme.size, stop.width)
         height: 34 * Theme.size
         radius: height / 2
