@@ -6,11 +6,15 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
+    id: window
     width: 1280; height: 752
     visible: true
     title: "Cockpit"
     color: Theme.background
     Component.onCompleted: Ros2.init("cockpit")
+
+    // On small screens, what is needed to drive comes first.
+    readonly property bool low: height < 700 * Theme.size
 
     // All that drives goes through this: it stops when a hand leaves, or the window.
     TwistCommand {
@@ -63,14 +67,16 @@ Window {
                 topic: "emergency_stop"
             }
             Battery { Layout.fillWidth: true }
-            Speed { Layout.fillWidth: true; command: drive }
+            Speed { Layout.fillWidth: true; command: drive; visible: !window.low }
             DiagnosticsView {
+                visible: !window.low
                 Layout.fillWidth: true
                 Layout.fillHeight: true
             }
             DriveKeys {
                 Layout.alignment: Qt.AlignHCenter
                 command: drive
+                keycaps: !window.low // the keys work all the same
             }
             DriveStick {
                 Layout.alignment: Qt.AlignHCenter

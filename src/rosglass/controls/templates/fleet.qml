@@ -6,6 +6,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
+    id: window
     width: 1200; height: 720
     visible: true
     title: "Fleet"
@@ -63,7 +64,12 @@ Window {
                     ns: robots.current
                     topic: "emergency_stop"
                 }
-                Speed { Layout.fillWidth: true; ns: robots.current; command: drive }
+                Speed {
+                    Layout.fillWidth: true
+                    visible: window.width >= 1000 * Theme.size
+                    ns: robots.current
+                    command: drive
+                }
                 DriveKeys { command: drive }
                 DriveStick { command: drive }
             }

@@ -32,6 +32,6 @@ Window {
         }
         Battery { Layout.fillWidth: true; Layout.preferredHeight: 110 * Theme.size }
         Speed { Layout.fillWidth: true; Layout.preferredHeight: 110 * Theme.size }
-        Compass { Layout.fillWidth: true; Layout.preferredHeight: 110 * Theme.size }
+        Compass { Layout.fillWidth: true; Layout.preferredHeight: 110 * Theme.size; note: "" }
     }
 }
