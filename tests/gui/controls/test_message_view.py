@@ -137,6 +137,24 @@ def test_received_messages_do_not_disturb_editing(controls: Any, wait: Any) -> N
     assert rows(controls, "key") == []
 
 
+@pytest.mark.parametrize(
+    "text", ["x" * 1000, "two\nlines", "y" * 30_000], ids=["long", "lines", "huge"]
+)
+def test_a_text_is_published_whole_after_it_was_edited(controls: Any, wait: Any, text: str) -> None:
+    got: list[str] = []
+    _, _publisher = show(controls, wait, "/text", "std_msgs/msg/String", data=text)
+    controls.robot.create_subscription(
+        "/text", "std_msgs/msg/String", lambda message: got.append(message.data)
+    )
+    push(controls, "edit")
+    controls.find("tree").forceActiveFocus()
+    for key in ("Home", "Return", "Return"):
+        press(controls, key)
+    push(controls, "publish")
+    wait(lambda: got)
+    assert got[-1] == text
+
+
 def test_nothing_can_be_edited_by_default(controls: Any, wait: Any) -> None:
     controls.show('MessageView { topic: "/pose" }')
     assert not controls.find("edit").isVisible()

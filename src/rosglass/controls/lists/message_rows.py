@@ -29,8 +29,10 @@ _MAX_ELEMENTS = 100
 _MAX_OPEN = 100
 #: Numbers of an array that its summary shows.
 _FIRST = 4
-_ROLES = ("key", "name", "depth", "folds", "open", "path", "type", "value", "unit", "comment",
-          "isLeaf", "editable")  # fmt: skip
+#: Characters of a text that can be edited in a line.
+_MAX_EDITED = 20_000
+_ROLES = ("key", "name", "depth", "folds", "open", "path", "type", "value", "text", "unit",
+          "comment", "isLeaf", "editable")  # fmt: skip
 _FLOAT = struct.Struct("f")
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
@@ -176,13 +178,15 @@ class MessageRows(LiveTopic):
         if role == "isLeaf":
             return item.is_leaf
         if role == "editable":
-            return self._editing and item.is_leaf
+            return self._editing and item.is_leaf and _fits_line(item.value)
         if role == "path":
             return self._path(field)
         if field.span is not None:
             return ""
         if role == "value":
             return self._text(item)
+        if role == "text":
+            return self._text_to_edit(item)
         if role == "type":
             return str(member.field.type) if item.is_array else member.field.type.name
         if role == "comment":
@@ -216,6 +220,12 @@ class MessageRows(LiveTopic):
             seconds, nanoseconds = (item.child(row).value for row in (0, 1))
             return f"{seconds}.{nanoseconds:09d} s"
         return ""
+
+    def _text_to_edit(self, item: TreeItem) -> str:
+        """Return a value as it is edited: `_text` escapes texts, and shortens long ones."""
+        if not self._editing or not _fits_line(item.value):
+            return ""
+        return item.value if isinstance(item.value, str) else self._text(item)
 
     @Slot(str)
     def toggle(self, key: str) -> None:
@@ -289,6 +299,11 @@ class MessageRows(LiveTopic):
         except Error as error:
             report(self, refusal=str(error))
             return QJSValue()
+
+
+def _fits_line(value: Any) -> bool:
+    """Return whether a text keeps all of its characters when it is edited in a line."""
+    return not isinstance(value, str) or (len(value) <= _MAX_EDITED and value.isprintable())
 
 
 def _number(item: TreeItem, value: Any) -> str:

@@ -170,9 +170,10 @@ LiveFrame {
                 sourceComponent: ThemeField {
                     objectName: "value"
                     placeholderText: row.type
+                    maximumLength: 20000
                     problem: messages.refusal
                     Component.onCompleted: {
-                        text = row.value
+                        text = row.text
                         forceActiveFocus()
                         selectAll()
                     }
