@@ -428,6 +428,7 @@ def test_invalid_files_are_rejected(
         ),
         ("import QtQuick 2.15\nButton {}", "it comes with: import QtQuick.Controls 2.15"),
         ("import QtQuick 2.15\nRowLayout {}", "it comes with: import QtQuick.Layouts 1.15"),
+        ("import Ros2 1.0\nBattery {}", "it comes with: import RosControls 1.0"),
     ],
 )
 def test_errors_say_what_to_do(

@@ -172,6 +172,13 @@ _IMPORTED_BY = {
     "QtQuick.Shapes 1.15": {"Shape", "ShapePath"},
     "QtQuick.Window 2.15": {"Window"},
     "RosRviz 1.0": {"AnchoredPopup", "MessageDialog"},
+    "RosControls 1.0": {
+        *("ActionPanel", "AlarmList", "Attitude", "Battery", "CameraGrid", "CameraView", "Compass"),
+        *("DiagnosticsView", "DriveKeys", "DriveStick", "EmergencyStop", "Gamepad", "GamepadView"),
+        *("Gauge", "GeoMap", "JointView", "LiveFrame", "LogView", "MapView", "MessageView"),
+        *("ModeSwitch", "NodeGraph", "ParameterForm", "Plot", "Recorder", "RobotSwitch"),
+        *("ServiceButton", "Speed", "TfTree", "Timeline", "TopicTree", "TwistCommand", "WhoSteers"),
+    },
 }
 #: Module -> the extra that installs it for Qt 6, and the command for Qt 5.
 _BROUGHT_BY = {
