@@ -39,6 +39,10 @@ def test_battery_names_a_topic_of_another_type(controls: Any, wait: Any) -> None
     wait(publisher.subscription_count)
     publisher.publish(data="full")
     wait(lambda: "std_msgs/msg/String, which is not" in battery.property("status"))
+    # The heading has no room for it.
+    wait(lambda: controls.find("wholeProblem").isVisible())
+    assert controls.find("wholeProblem").property("text") == battery.property("status")
+    assert not controls.find("wholeProblem").property("truncated")
     assert battery.property("stale")
 
 

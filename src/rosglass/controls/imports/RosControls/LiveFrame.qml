@@ -71,5 +71,18 @@ Item {
         id: body
         anchors { top: parent.top; topMargin: frame.top_; left: parent.left; right: parent.right; bottom: parent.bottom; leftMargin: frame.inset; rightMargin: frame.inset; bottomMargin: frame.inset }
         opacity: frame.stale ? 0.35 : 1
+    }    // Where there is nothing else to show, what the heading has no room for.
+    ThemeText {
+        objectName: "wholeProblem"
+        anchors { fill: body; margins: frame.framed ? 0 : Theme.gap }
+        visible: aside.truncated && frame.problem !== "" && frame.stale && !!frame.source && !frame.source.message
+        text: frame.problem
+        color: Theme.bad
+        font.pixelSize: Theme.small
+        wrapMode: Text.Wrap
+        verticalAlignment: Text.AlignVCenter
+        horizontalAlignment: Text.AlignHCenter
+        Accessible.ignored: true
+        Rectangle { z: -1; anchors.fill: parent; color: Theme.panel; opacity: 0.85 }
     }
 }
