@@ -6,6 +6,7 @@ module, :class:`Screen` starts it, :class:`Robot` keeps what arrives, :data:`WAY
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import subprocess
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Size of the window, which is at the upper left of the screen; and the stick in it.
 _SIZE, _STICK = (600, 400), (100, 100)
+#: X11's code of the key Up in the keypad, which is the 8 with Num Lock.
+_KEYPAD_UP = 80
 #: Seconds without a message after which nothing is sent any more: zeros are up to 0.1 s apart.
 _SILENCE_S = 0.5
 SCREEN = """import QtQuick 2.15
@@ -188,7 +191,7 @@ class Screen:
 
     def reset(self) -> None:
         """Undo what the ways to let go did."""
-        self.x11("mouseup 1; keyup w; mousemove", *_STICK)
+        self.x11("mouseup 1; keyup w; keyup", _KEYPAD_UP, "; mousemove", *_STICK)
         since = len(self.lines)
         self.ask("reset()")
 
@@ -261,6 +264,11 @@ def press(screen: Screen) -> None:
     screen.x11("keydown", "w")
 
 
+def press_keypad(screen: Screen) -> None:
+    """Hold the key Up in the keypad."""
+    screen.x11("keydown", _KEYPAD_UP)
+
+
 def push(screen: Screen) -> None:
     """Steer by code."""
     screen.ask("set('window', 'pushed', True)")
@@ -314,6 +322,39 @@ def _stop_and_continue(screen: Screen) -> float:
     return began
 
 
+def _focus_other(screen: Screen) -> float:
+    """Not found by the one xdotool for all input: it would send keys there from then on."""
+    command = ["xdotool", "search", "--sync", "--onlyvisible", "--class", "xlogo"]
+    env = {**os.environ, "DISPLAY": screen.display}
+    found = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
+    return screen.x11("windowfocus", found.stdout.split()[0])
+
+
+def _release_with_num_lock(screen: Screen) -> float:
+    """The key has another name when it is released."""
+    screen.x11("key Num_Lock")
+    nothing_happens(0.1)
+    began = screen.x11("keyup", _KEYPAD_UP)
+    nothing_happens(0.1)
+    screen.x11("key Num_Lock")
+    return began
+
+
+def _grab_keyboard(screen: Screen) -> float:
+    """Another program grabs the keyboard for a moment, in which the key is released."""
+    x11 = ctypes.CDLL("libX11.so.6")
+    x11.XOpenDisplay.restype = x11.XDefaultRootWindow.restype = ctypes.c_void_p
+    display = ctypes.c_void_p(x11.XOpenDisplay(screen.display.encode()))
+    root = ctypes.c_void_p(x11.XDefaultRootWindow(display))
+    began = time.monotonic()
+    assert x11.XGrabKeyboard(display, root, False, 1, 1, ctypes.c_ulong(0)) == 0
+    screen.x11("keyup w")
+    time.sleep(0.03)
+    x11.XUngrabKeyboard(display, ctypes.c_ulong(0))
+    x11.XCloseDisplay(display)
+    return began
+
+
 def _second_input(screen: Screen) -> float:
     """A second input does not change what the first one does; letting go of the first halts."""
     screen.ask("set('window', 'pushed', True)")
@@ -324,13 +365,13 @@ def _second_input(screen: Screen) -> float:
 WAYS: dict[str, Way] = {
     "stick released": Way(drag, lambda screen: screen.x11("mouseup", 1)),
     "key released": Way(press, lambda screen: screen.x11("keyup", "w")),
+    "released with Num Lock": Way(press_keypad, _release_with_num_lock),
+    "keyboard grabbed": Way(press, _grab_keyboard),
     "touch cancelled": Way(touch, _asks("touch('cancel', 100, 40)")),
     "pointer grab lost": Way(drag, _asks("item('touch').ungrabMouse()")),
     "dead-man released": Way(push, _asks("set('window', 'pushed', False)")),
     "focus lost": Way(press, _asks("item('other').show(); item('other').requestActivate()")),
-    "focus to another program": Way(
-        press, lambda screen: screen.x11("search --class xlogo windowfocus")
-    ),
+    "focus to another program": Way(press, _focus_other),
     "window hidden": Way(drag, _asks("item('window').hide()")),
     "window minimised": Way(drag, _asks("item('window').showMinimized()")),
     "tab changed": Way(press, _asks("set('page', 'visible', False)")),

@@ -161,6 +161,35 @@ def test_repeats_do_not_release(keys: Drive) -> None:
     assert set(keys.messages[moving:]) == {(0.5, 0.0, 0.0)}
 
 
+@pytest.mark.parametrize("repeats", [0, 3])
+def test_release_with_another_meaning(keys: Drive, repeats: int) -> None:
+    """As after Num Lock, AltGr or a change of the layout: the same key has another name."""
+
+    def send(kind: Any, key: Any) -> None:
+        keys.send(QtGui.QKeyEvent(kind, key, QtCore.Qt.KeyboardModifier.NoModifier, 80, 0, 0))
+
+    kinds = QtCore.QEvent.Type
+    send(kinds.KeyPress, Key.Key_Up)
+    keys.moves(0.5, 0, 0)
+    for _ in range(repeats):
+        send(kinds.KeyRelease, Key.Key_8)
+        send(kinds.KeyPress, Key.Key_8)
+    keys.wait.nothing_happens(0.05)
+    assert keys.messages[-1] == (0.5, 0.0, 0.0)
+    send(kinds.KeyRelease, Key.Key_8)
+    keys.stands()
+    assert not keys.item.property("keys").property("held")
+    # What the key means now is what counts.
+    send(kinds.KeyPress, Key.Key_8)
+    keys.wait.nothing_happens(0.1)
+    assert keys.messages[-1] == (0.0, 0.0, 0.0)
+    send(kinds.KeyRelease, Key.Key_8)
+    send(kinds.KeyPress, Key.Key_Up)
+    keys.moves(0.5, 0, 0)
+    send(kinds.KeyRelease, Key.Key_Up)
+    keys.stands()
+
+
 def test_shortcuts_are_left_alone(keys: Drive) -> None:
     keys.key(Key.Key_W, down=True, control=True)
     keys.wait.nothing_happens(0.1)

@@ -14,14 +14,15 @@ if TYPE_CHECKING:
 
 __all__ = ["FocusWatch", "find_item", "obstruction", "popup_layer"]
 
-#: X11's FocusOut events: the type, the modes in which the focus really moves (NotifyNormal and
-#: NotifyWhileGrabbed), and the details by which it stays in the window (NotifyInferior), or is not
-#: the keyboard's (NotifyPointer).
-_FOCUS_OUT, _MODES, _NOT_LEFT = 10, (0, 3), (2, 5)
+#: X11's FocusOut events: the type, the modes in which keys go elsewhere (NotifyNormal, NotifyGrab
+#: and NotifyWhileGrabbed), and the details by which it stays in the window (NotifyInferior), or is
+#: not the keyboard's (NotifyPointer). A grab, as of a volume key or a screen lock, may be over
+#: before Qt reports it; a key that was let go in it is never released.
+_FOCUS_OUT, _MODES, _NOT_LEFT = 10, (0, 1, 3), (2, 5)
 
 
 class FocusWatch(QtCore.QAbstractNativeEventFilter):
-    """Notices on X11 at once that a window loses the focus; Qt waits 0.1 s for another one.
+    """Notices on X11 at once that a window loses the keyboard; Qt waits 0.1 s for another one.
 
     It costs 8 us for each event of the X server while it is used.
 

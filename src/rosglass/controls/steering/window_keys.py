@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from rosglass.controls.steering.in_front import find_item
+from rosglass.controls.steering.in_front import FocusWatch, find_item
 from rosglass.qml.elements.image_sinks import window_of
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QtCore, QtGui, QtQuick, Signal, Slot, is_alive
 
 __all__ = ["WindowKeys"]
@@ -44,6 +45,10 @@ class WindowKeys(QtCore.QObject):
         self._kept: list[Any] = []
         #: Keys whose release may be one of a repeat -> ticks until it counts.
         self._leaving: dict[int, int] = {}
+        #: Scan codes of the keys that are held down -> what they meant when they were pressed.
+        #: With Num Lock, AltGr or another layout since, their release has another meaning.
+        self._codes: dict[int, int] = {}
+        self._focus = FocusWatch(weak_callback(self._on_focus_lost))
         kinds = QtCore.QEvent.Type
         self._press, self._release = kinds.KeyPress, kinds.KeyRelease
         self._timer = QtCore.QTimer(self)
@@ -90,7 +95,8 @@ class WindowKeys(QtCore.QObject):
         kind = event.type()
         if kind not in (self._press, self._release) or watched is not self._window:
             return False
-        key = int(event.key())
+        code = int(event.nativeScanCode())
+        key = self._codes.get(code, int(event.key()))
         if key not in self.keys:
             return False
         if kind == self._release:
@@ -106,6 +112,9 @@ class WindowKeys(QtCore.QObject):
         # A repeat of a key that is not held: it was pressed in another window, or a text field.
         if repeats or not self.enabled or _is_shortcut(event) or self._is_text():
             return False
+        if code:  # none in events that were made by a program
+            self._codes[code] = key
+        self._focus.start()
         report(self, held=[*self._held, key])
         self.pressed.emit(key)
         return True
@@ -123,6 +132,11 @@ class WindowKeys(QtCore.QObject):
         if is_alive(self) and self._is_text():
             self._release_all()
 
+    def _on_focus_lost(self) -> None:
+        if is_alive(self):
+            # Not now: the watch cannot be stopped from its own call.
+            QtCore.QTimer.singleShot(0, self._release_all)
+
     @Slot()
     def _release_all(self) -> None:
         """Let go of all keys: their release may go elsewhere."""
@@ -130,8 +144,11 @@ class WindowKeys(QtCore.QObject):
             self._lift(list(self._held))
 
     def _lift(self, gone: list[int]) -> None:
+        self._codes = {code: key for code, key in self._codes.items() if key not in gone}
         if not gone or not report(self, held=[key for key in self._held if key not in gone]):
             return
+        if not self._held:
+            self._focus.stop()
         for key in gone:
             if is_alive(self):
                 self.released.emit(key)
