@@ -11,15 +11,16 @@ Window {
     Component.onCompleted: Ros2.init("operator_screen")
 
     TwistCommand {
-        id: drive
-        maxSpeed: 0.5; maxTurn: 1.0
-        obstacle: stop.blocks ? "emergency stop" : ""
+        id: drive; maxSpeed: 0.5; maxTurn: 1.0
+        obstacle: stop.blocks ? "emergency stop" : camera.live ? "" : "no live image"
     }
     RowLayout {
         anchors { fill: parent; margins: Theme.gap }
         GridLayout {
             columns: 2
-            CameraView { Layout.fillWidth: true; Layout.fillHeight: true; Layout.preferredHeight: 3; Layout.columnSpan: 2 }
+            CameraView {
+                id: camera; Layout.fillWidth: true; Layout.fillHeight: true; Layout.preferredHeight: 3; Layout.columnSpan: 2
+            }
             MapView { Layout.fillWidth: true; Layout.fillHeight: true; Layout.preferredHeight: 2; Layout.preferredWidth: 1 }
             Plot {
                 Layout.fillWidth: true; Layout.fillHeight: true; Layout.preferredHeight: 2; Layout.preferredWidth: 1

@@ -111,6 +111,7 @@ _PACKAGES = (
     "bridge",
     "comm",
     "connection",
+    "controls",
     "demo",
     "errors",
     "interfaces",

@@ -19,7 +19,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 def test_interface_shown_is_the_example() -> None:
     shown = re.search(r"```qml\n(.*?)```", README, re.DOTALL)
-    example = (ROOT / "examples/remote_control.qml").read_text(encoding="utf-8")
+    example = (ROOT / "examples/operator_screen.qml").read_text(encoding="utf-8")
     assert shown is not None
     assert shown[1] == example
     assert len(example.splitlines()) <= 42
