@@ -85,6 +85,8 @@ def test_path_that_cannot_be_plotted_is_named(robot: rosglass.Node, plot: Any) -
     eventually(lambda: shown.received == 1)
     eventually(lambda: "data of std_msgs/msg/String is a string" in str(shown.problems()))
     assert "/missing has no publisher" in str(shown.problems())
+    text = " ".join(line.strip() for line in shown.lines(40, 24, PLAIN))
+    assert all(problem in text for problem in shown.problems()), "wrapped, not cut"
 
 
 def test_terminal_needs_no_qt() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+import textwrap
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -162,7 +163,11 @@ class TextPlot:
             style(f"{name} {reading}"[: width - 1], _COLORS[at % len(_COLORS)])
             for at, (name, reading, _) in enumerate(shown)
         ]
-        problems = [style(problem[: width - 1], "red") for problem in self.problems()]
+        problems = [
+            style(line, "red")
+            for problem in self.problems()
+            for line in textwrap.wrap(problem, width - 1)
+        ]
         most = max(1, height // 2 - 1)
         texts = [*problems, *legend]
         if len(texts) > most:
