@@ -49,3 +49,15 @@ def test_battery_names_a_topic_of_another_type(controls: Any, wait: Any) -> None
 def test_battery_without_data_says_so(controls: Any) -> None:
     battery = controls.show("Battery {}")
     assert battery.property("status") == "NO DATA YET"
+
+
+def test_old_data_have_their_age_before_the_reason(controls: Any, wait: Any) -> None:
+    publisher = controls.robot.create_publisher("/battery", TYPE)
+    battery = controls.show('Battery { topic: "/battery"; width: 220 }')
+    wait(publisher.subscription_count)
+    publisher.publish(percentage=0.5)
+    wait(lambda: not battery.property("stale"))
+    publisher.close()
+    wait(lambda: "no publisher since" in battery.property("status"))
+    wait(lambda: controls.find("aside").property("text").startswith("OLD: "))
+    assert battery.property("status") in controls.find("aside").property("text")

@@ -25,7 +25,7 @@ Item {
     readonly property string status: problem ? problem
         : !stale ? ""
         : age < 0 ? qsTr("NO DATA YET")
-        : qsTr("OLD: %1 s").arg(age < 10 ? age.toFixed(1) : age.toFixed(0))
+        : old_
 
     default property alias content: body.data
     readonly property alias body: body
@@ -35,6 +35,9 @@ Item {
 
     readonly property real top_: framed ? Theme.small * 1.5 + Theme.gap * 1.1 : 0
     readonly property real inset: framed ? Theme.gap : 0
+    readonly property string old_: qsTr("OLD: %1 s").arg(age < 10 ? age.toFixed(1) : age.toFixed(0))
+    // Data that is shown, but old, has its age before the reason, of which the end may be cut.
+    readonly property bool dated_: problem !== "" && stale && age >= 0 && !!source && !!source.message
     readonly property bool wrong: stale || problem !== ""
 
     Accessible.role: Accessible.Grouping
@@ -62,7 +65,8 @@ Item {
         anchors { right: parent.right; rightMargin: Theme.gap; top: parent.top; topMargin: Theme.gap * 0.6 }
         width: Math.min(implicitWidth, Math.max(0, frame.width - 2 * Theme.gap - (frame.framed && frame.title ? Math.min(heading.implicitWidth, frame.width / 2) + Theme.gap : 0)))
         z: 1
-        text: frame.status || frame.note
+        objectName: "aside"
+        text: frame.dated_ ? frame.old_ + " · " + frame.status : frame.status || frame.note
         color: frame.wrong ? Theme.bad : Theme.dim
         font { pixelSize: Theme.small; weight: frame.wrong ? Font.Bold : Font.Normal }
         horizontalAlignment: Text.AlignRight
