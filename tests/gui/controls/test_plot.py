@@ -176,6 +176,16 @@ def test_path_that_cannot_be_plotted_is_named(
     wait(lambda: "5" in shown.readings())
 
 
+def test_robot_that_is_gone_is_named_with_the_topic(controls: Any, plot: Any, wait: Any) -> None:
+    publisher = controls.robot.create_publisher("/value", NUMBER)
+    shown = plot('Plot { paths: ["/value:data"] }')
+    wait(publisher.subscription_count)
+    publisher.publish(data=1.0)
+    wait(lambda: shown.readings() == ["1"])
+    publisher.close()
+    wait(lambda: shown.get("problem").startswith("/value: it has had no publisher since"))
+
+
 def test_index_beyond_an_array_is_a_gap_with_a_reason(controls: Any, plot: Any, wait: Any) -> None:
     publisher = controls.robot.create_publisher("/joints", "sensor_msgs/msg/JointState")
     shown = plot('Plot { paths: ["/joints:position[2]", "/joints:velocity[0]"] }')

@@ -752,7 +752,9 @@ def _problem_of(entry: _Entry) -> str:
         return f"{topic.topic}: {field}"
     if topic.problem:
         return f"{topic.topic}: {topic.problem}"
-    return topic.subscription.problem if topic.subscription is not None else ""
+    problem = topic.subscription.problem if topic.subscription is not None else ""
+    # Some begin with the topic: "/odom has two types".
+    return problem if not problem or topic.topic in problem else f"{topic.topic}: {problem}"
 
 
 def _reason_of(entry: _Entry) -> str:
