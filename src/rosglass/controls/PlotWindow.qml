@@ -21,7 +21,7 @@ Window {
         paths: window.options.paths
         window: window.options.window
         history: window.options.history
-        saveFolder: window.options.folder
+        folder: window.options.folder
         title: qsTr("Plot")
         onSaved: function(file, problem) { problem ? console.error(problem) : console.info(qsTr("%1 was written").arg(file)) }
     }

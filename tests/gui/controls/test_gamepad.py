@@ -114,7 +114,7 @@ def axis(element: Any, number: int) -> float:
 
 
 def drive_state(element: Any) -> Any:
-    return element.property("obstacle"), element.property("command").property("problem")
+    return element.property("refusal"), element.property("command").property("problem")
 
 
 def halted(twists: list[tuple[float, float]]) -> bool:
@@ -145,9 +145,7 @@ def test_it_steers_while_the_dead_man_button_is_held(
     wait(lambda: axis(element, LEFT_Y) == 1.0)
     assert twists == []
     pad.button(LEFT_SHOULDER)
-    wait(
-        lambda: twists and twists[-1] == (0.5, 0.0), lambda: (twists, element.property("obstacle"))
-    )
+    wait(lambda: twists and twists[-1] == (0.5, 0.0), lambda: (twists, element.property("refusal")))
     pad.button(RIGHT_SHOULDER)  # turbo
     wait(lambda: twists[-1] == (1.0, 0.0))
     pad.axis(LEFT_X, 1.0)  # to the right
@@ -173,7 +171,7 @@ def test_a_gamepad_unplugged_in_a_turn_halts(
     pad.unplug()
     wait(lambda: halted(twists))
     wait(lambda: not element.property("connected"))
-    assert element.property("obstacle") == "no gamepad"
+    assert element.property("refusal") == "no gamepad"
     # Plugged in with the button held: it does not count until it was let go once.
     again = plug(pressed=(LEFT_SHOULDER,))
     again.axis(LEFT_Y, -1.0)
@@ -196,7 +194,7 @@ def test_only_the_window_in_front_counts(controls: Any, wait: Any, plug: Any, tw
     other.show()
     other.requestActivate()
     wait(lambda: halted(twists))
-    wait(lambda: element.property("obstacle") == "the window is not in front")
+    wait(lambda: element.property("refusal") == "the window is not in front")
     pad.button(A)
     pad.button(B)
     wait(lambda: root.property("stops") == 1, "the stop counts wherever the focus is")
@@ -204,7 +202,7 @@ def test_only_the_window_in_front_counts(controls: Any, wait: Any, plug: Any, tw
     del twists[:]
     other.destroy()
     in_front(controls, wait)
-    wait(lambda: element.property("obstacle") == "")
+    wait(lambda: element.property("refusal") == "")
     pad.axis(LEFT_Y, -0.9)
     wait(lambda: 0.8 < axis(element, LEFT_Y) < 0.95)
     assert [one for one in twists if one != (0.0, 0.0)] == [], "the button was never let go"

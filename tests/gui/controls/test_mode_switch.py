@@ -41,7 +41,7 @@ def test_it_shows_the_confirmed_mode_not_the_requested(controls: Any, wait: Any)
     assert outcome(controls) == ""
     state.publish(data="<b>nap</b>" * 100)
     wait(lambda: modes.property("note").startswith("<b>nap"))
-    assert len(modes.property("note")) <= 60
+    assert len(modes.property("note")) <= 64
     state.close()
     wait(lambda: modes.property("stale"))
     keep.close()

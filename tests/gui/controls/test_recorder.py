@@ -52,20 +52,20 @@ def test_recording_is_read_by_an_independent_reader(
     recorder = show(controls, tmp_path, 'markTexts: ["<b>Hit</b>"]')
     click(controls, "record")
     wait(sender.subscription_count)
-    sending(wait, sender, lambda: recorder.property("messages") >= 10)
+    sending(wait, sender, lambda: recorder.property("messageCount") >= 10)
     click(controls, "mark_0")
-    wait(lambda: recorder.property("marks") == 1)
+    wait(lambda: recorder.property("markCount") == 1)
     click(controls, "record")
     wait(lambda: ends(recorder))
     file = Path(ends(recorder)[0])
     assert file.parent == tmp_path
-    assert file == Path(recorder.property("path"))
+    assert file == Path(recorder.property("file"))
     with file.open("rb") as stream:
         reader = make_reader(stream)
         found = [(channel.topic, schema.name) for schema, channel, _ in reader.iter_messages()]
         summary = reader.get_summary()
     assert summary is not None
-    assert found.count(("/odom", ODOM)) == recorder.property("messages") >= 10
+    assert found.count(("/odom", ODOM)) == recorder.property("messageCount") >= 10
     assert found.count((MARKS_TOPIC, "std_msgs/msg/String")) == 1
     ((time, text),) = read_marks(file)
     assert text == "<b>Hit</b>"
@@ -78,7 +78,7 @@ def test_only_chosen_topics_are_recorded(controls: Any, wait: Any, tmp_path: Pat
     recorder = show(controls, tmp_path, 'topics: ["/odom", "/missing"]; fileName: "run.mcap"')
     recorder.start()
     wait(sender.subscription_count)
-    sending(wait, sender, lambda: recorder.property("messages"))
+    sending(wait, sender, lambda: recorder.property("messageCount"))
     assert not other.subscription_count()
     assert "/missing: no publisher" in controls.find("warning").property("text")
     recorder.stop()
@@ -165,9 +165,9 @@ def test_recording_over_a_real_middleware(
     recorder = show(live_controls, tmp_path, more)
     recorder.start()
     wait(sender.subscription_count)
-    sending(wait, sender, lambda: recorder.property("messages") >= 5)
+    sending(wait, sender, lambda: recorder.property("messageCount") >= 5)
     assert recorder.mark("here")
-    wait(lambda: recorder.property("marks") == 1)
+    wait(lambda: recorder.property("markCount") == 1)
     recorder.stop()
     wait(lambda: ends(recorder))
     file = Path(ends(recorder)[0])
@@ -185,7 +185,7 @@ def test_recording_is_completed_when_the_node_goes(
     recorder = show(controls, tmp_path, 'fileName: "gone"')
     recorder.start()
     wait(sender.subscription_count)
-    sending(wait, sender, lambda: recorder.property("messages"))
+    sending(wait, sender, lambda: recorder.property("messageCount"))
     controls.engine_session.shutdown()
     wait(lambda: ends(recorder))
     assert not recorder.property("recording")
@@ -205,7 +205,7 @@ def test_program_that_ends_completes_its_recording(start: Any, wait: Any, tmp_pa
         Recorder {{
             folder: "{tmp_path}"; fileName: "end"; recording: true
             Component.onCompleted: Ros2.init("operator")
-            onElapsedChanged: if (elapsed > 0 && !marks && mark("here")) quit.start()
+            onElapsedChanged: if (elapsed > 0 && !markCount && mark("here")) quit.start()
             Timer {{ id: quit; interval: 100; onTriggered: Qt.quit() }}
         }}"""
     )

@@ -195,7 +195,7 @@ class Gamepad(Element):
     #: Whether a hand steers with it.
     held = ReadOnly(bool, False)
     #: Why it does not steer now; empty if it would.
-    obstacle = ReadOnly(str, "")
+    refusal = ReadOnly(str, "")
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -414,7 +414,7 @@ class Gamepad(Element):
                 connected=pad is not None,
                 name="" if pad is None else pad.name,
                 held=self._is_steering,
-                obstacle=obstacle,
+                refusal=obstacle,
             )
 
     def _steer(self, pad: Pad) -> None:

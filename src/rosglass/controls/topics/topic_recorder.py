@@ -53,7 +53,7 @@ class TopicRecorder(Element):
     """Records topics to files. See its page in ``docs/controls``."""
 
     #: A recording is complete: its file (empty if nothing was recorded), and why it ended.
-    finished = Signal(str, str, arguments=["path", "reason"])
+    finished = Signal(str, str, arguments=["file", "reason"])
     #: A recording did not begin, or ended by this error.
     failed = Signal(str, arguments=["reason"])
     recordingChanged = Signal()
@@ -75,15 +75,15 @@ class TopicRecorder(Element):
     #: Whether a file is being completed.
     completing = ReadOnly(bool, False)
     #: The file of the present or last recording.
-    path = ReadOnly(str, "")
+    file = ReadOnly(str, "")
     #: Why the last recording ended.
     ending = ReadOnly(str, "")
     #: Seconds, bytes and counts of the present or last recording.
     elapsed = ReadOnly(float, 0.0)
     size = ReadOnly(float, 0.0)
-    messages = ReadOnly(int, 0)
+    messageCount = ReadOnly(int, 0)
     dropped = ReadOnly(int, 0)
-    marks = ReadOnly(int, 0)
+    markCount = ReadOnly(int, 0)
     topicCount = ReadOnly(int, 0)
     #: Why topics are not recorded, such as ``/scan: no publisher``.
     missing = ReadOnly(str, "")
@@ -98,7 +98,7 @@ class TopicRecorder(Element):
     ) -> None:
         super().__init__(parent, runtime)
         self._active = False
-        self._path: str
+        self._file: str
         self._ticks = self._unfinished = 0
         self._looking = False
         self._reason = ""
@@ -139,13 +139,13 @@ class TopicRecorder(Element):
         self._set_problem("")
         report(
             self,
-            path="",
+            file="",
             ending="",
             elapsed=0.0,
             size=0.0,
-            messages=0,
+            messageCount=0,
             dropped=0,
-            marks=0,
+            markCount=0,
             topicCount=0,
             missing="",
         )
@@ -177,7 +177,7 @@ class TopicRecorder(Element):
         name = self.fileName or f"recording_{datetime.now():%Y-%m-%d_%H-%M-%S}"
         suffix = f".{self.format}"
         path = self._folder_path() / (name if name.endswith(suffix) else name + suffix)
-        report(self, path=str(path))
+        report(self, file=str(path))
         return node, path, self._topics, self.exclude, int(self.sizeLimit), self.timeLimit
 
     def _update(self) -> None:
@@ -237,15 +237,15 @@ class TopicRecorder(Element):
             self.failed.emit(error)
             return
         path = endpoint.path
-        if str(path) == self._path:
+        if str(path) == self._file:
             size = float(path.stat().st_size) if path.exists() else 0.0
             status = endpoint.status()
             report(
                 self,
                 ending=reason if size else "nothing was recorded, and no file is left",
                 size=size,
-                messages=status.messages,
-                marks=status.marks,
+                messageCount=status.messages,
+                markCount=status.marks,
             )
         self.finished.emit(str(path) if path.exists() else "", reason)
 
@@ -276,9 +276,9 @@ class TopicRecorder(Element):
             self,
             elapsed=round(status.duration, 1),
             size=float(status.size),
-            messages=status.messages,
+            messageCount=status.messages,
             dropped=status.dropped,
-            marks=status.marks,
+            markCount=status.marks,
             topicCount=len(status.topics),
             missing="; ".join(missing)[:2000],
         )

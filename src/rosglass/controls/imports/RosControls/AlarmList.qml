@@ -2,6 +2,7 @@
 import QtQuick 2.15
 import Ros2 1.0
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: list
@@ -120,7 +121,7 @@ LiveFrame {
         more: {
             const parts = []
             if (list.missing_.length)
-                parts.push(qsTr("no data yet: %1").arg(list.missing_.join(", ").slice(0, 200)))
+                parts.push(qsTr("no data yet: %1").arg(Fields.bounded(list.missing_.join(", "), 200)))
             if (alarms.omitted)
                 parts.push(qsTr("%1 further alarms not shown").arg(alarms.omitted))
             if (list.mute_ && list.sound)

@@ -36,7 +36,7 @@ LiveFrame {
             width: parent.width
             visible: view.connected_
             text: !view.connected_ ? ""
-                : view.gamepad.obstacle ? qsTr("does not count: %1").arg(view.gamepad.obstacle)
+                : view.gamepad.refusal ? qsTr("does not count: %1").arg(view.gamepad.refusal)
                 : view.gamepad.held ? (view.refused_ ? qsTr("does not steer: %1").arg(view.refused_) : qsTr("steers"))
                 : view.gamepad.deadMan ? qsTr("hold %1 to steer").arg(view.gamepad.deadMan)
                 : qsTr("let go")

@@ -2,6 +2,7 @@
 // downloaded.
 import QtQuick 2.15
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: view
@@ -86,7 +87,7 @@ LiveFrame {
     source: live
     problem: live.problem ? live.problem
         : message && !fixed_ ? (scene_.seen ? qsTr("%1: the last position is shown").arg(fix) : fix)
-        : network_ ? qsTr("%1 is not read: tiles come from a folder or an MBTiles file").arg(path_(tiles).slice(0, 100))
+        : network_ ? qsTr("%1 is not read: tiles come from a folder or an MBTiles file").arg(Fields.bounded(path_(tiles), 100))
         : scene_.tilesProblem
     note: fixed_ && isFinite(accuracy) ? qsTr("± %1 m").arg(accuracy < 10 ? accuracy.toFixed(2) : accuracy.toFixed(0)) : ""
     contentWidth: 320 * Theme.size

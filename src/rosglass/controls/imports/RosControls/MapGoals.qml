@@ -2,6 +2,7 @@
 // part of MapView, which shows nothing by itself.
 import QtQuick 2.15
 import Ros2 1.0
+import "fields.js" as Fields
 
 QtObject {
     id: goals
@@ -35,9 +36,6 @@ QtObject {
     property bool accepted_: false
     property string action_: ""
 
-    function within_(name) {
-        return ns && name.charAt(0) !== "/" ? ns.replace(/\/+$/, "") + "/" + name : name
-    }
     function pose_(pose) {
         return { position: { x: pose.x, y: pose.y, z: 0 },
                  orientation: { x: 0, y: 0, z: Math.sin(pose.yaw / 2), w: Math.cos(pose.yaw / 2) } }
@@ -46,13 +44,13 @@ QtObject {
         return { header: { frame_id: scene.fixedFrame }, pose: pose_(pose) }
     }
     function publisher_(topic, type, qos) {
-        const name = within_(topic)
+        const name = Fields.resolve(ns, topic)
         if (!publishers_[name])
             publishers_[name] = Ros2.createPublisher(name, type, qos)
         return publishers_[name]
     }
     function refuse_(why) {
-        text = why.slice(0, 300)
+        text = Fields.bounded(why)
         bad = true
         return false
     }
@@ -107,13 +105,13 @@ QtObject {
         const publisher = publisher_(poseTopic, "geometry_msgs/msg/PoseWithCovarianceStamped")
         const sent = publisher.publish({ header: { frame_id: scene.fixedFrame },
                                          pose: { pose: pose_(pose), covariance: covariance } })
-        text = sent ? qsTr("the pose was sent to %1").arg(scene.absolute(within_(poseTopic))) : qsTr("the pose was not sent: %1").arg(publisher.problem || qsTr("no connection"))
+        text = sent ? qsTr("the pose was sent to %1").arg(scene.absolute(Fields.resolve(ns, poseTopic))) : qsTr("the pose was not sent: %1").arg(publisher.problem || qsTr("no connection"))
         bad = !sent
         return sent
     }
     function publishGoal_(pose) {
         const publisher = publisher_(goalTopic || scene.goalTopic, "geometry_msgs/msg/PoseStamped", Ros2.CommandQoS())
-        const name = scene.absolute(within_(goalTopic || scene.goalTopic))
+        const name = scene.absolute(Fields.resolve(ns, goalTopic || scene.goalTopic))
         if (scene.subscribers(name) === 0)
             return refuse_(qsTr("not sent: there is no navigation action, and %1 has no subscriber").arg(name))
         if (!publisher.publish(stamped_(pose)))
@@ -193,14 +191,14 @@ QtObject {
         const has = name => result.result && Object.keys(result.result).indexOf(name) >= 0
         const missed = has("missed_waypoints") ? result.result.missed_waypoints.length : 0
         const reason = result.reason || (has("error_msg") ? result.result.error_msg : "")
-        text = result.code === 4 && missed ? qsTr("reached, without %1 of the waypoints").arg(missed)
-             : result.code === 4 ? qsTr("reached")
-             : result.code === 5 ? qsTr("cancelled")
-             : result.code === 6 && !accepted_ ? qsTr("refused: %1").arg(reason)
-             : result.code === 6 ? (reason ? qsTr("not reached: %1").arg(reason) : qsTr("not reached"))
+        text = result.code === ActionGoalStatus.Succeeded && missed ? qsTr("reached, without %1 of the waypoints").arg(missed)
+             : result.code === ActionGoalStatus.Succeeded ? qsTr("reached")
+             : result.code === ActionGoalStatus.Canceled ? qsTr("cancelled")
+             : result.code === ActionGoalStatus.Aborted && !accepted_ ? qsTr("refused: %1").arg(reason)
+             : result.code === ActionGoalStatus.Aborted ? (reason ? qsTr("not reached: %1").arg(reason) : qsTr("not reached"))
              : qsTr("outcome unknown: %1").arg(reason)
-        text = text.slice(0, 300)
-        bad = result.code !== 4 && result.code !== 5 || missed > 0
+        text = Fields.bounded(text)
+        bad = result.code !== ActionGoalStatus.Succeeded && result.code !== ActionGoalStatus.Canceled || missed > 0
         active = ""
         cancelling = false
         handle_ = null

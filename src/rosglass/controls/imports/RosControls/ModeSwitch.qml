@@ -74,7 +74,7 @@ LiveFrame {
 
     function text_(value) {
         const one = choices_.find(function(one) { return one.value === value })
-        return one ? one.text : String(value).slice(0, 60)
+        return one ? one.text : Fields.bounded(value, 60)
     }
 
     // Request a mode; what is shown changes when the robot confirms it.

@@ -4,6 +4,7 @@ import QtQuick 2.15
 import QtQuick.Templates 2.15 as T
 import Ros2 1.0
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: form
@@ -41,7 +42,7 @@ LiveFrame {
     source: null
     stale: node_ !== "" && !ready
     age: total ? 0 : -1
-    problem: parameters.problem ? parameters.problem.slice(0, 300)
+    problem: parameters.problem ? Fields.bounded(parameters.problem)
         : node_ && !ready ? (total ? qsTr("NOT AVAILABLE: these values are old") : qsTr("waiting for %1").arg(node_)) : ""
     note: total ? (parameters.count < total ? qsTr("%1 of %2").arg(parameters.count).arg(total) : String(total)) : ""
     contentWidth: 380 * Theme.size

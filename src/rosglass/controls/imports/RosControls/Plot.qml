@@ -27,8 +27,9 @@ LiveFrame {
     property alias leftLog: plotted.leftLog
     property alias rightLog: plotted.rightLog
     // Where the buttons CSV and PNG write; without a folder, there are none.
-    property string saveFolder
-    property bool buttons: true
+    property string folder
+    // Whether it has buttons.
+    property bool tools: true
     // Place of the cursor from 0 to 1; negative for none.
     property real cursor: -1
     // Messages received, lost on their way or unreadable; samples older than the history.
@@ -61,7 +62,7 @@ LiveFrame {
     }
 
     function save_(ending) {
-        const file = saveFolder.replace(/^file:\/\//, "") + "/plot-" + Qt.formatDateTime(new Date(), "yyyyMMdd-HHmmss") + ending
+        const file = folder.replace(/^file:\/\//, "") + "/plot-" + Qt.formatDateTime(new Date(), "yyyyMMdd-HHmmss") + ending
         ending === ".csv" ? saveCsv(file) : savePng(file)
     }
     function isOwn_(path) { return paths.indexOf(path) >= 0 }
@@ -190,14 +191,14 @@ LiveFrame {
         id: toolbar
         anchors { right: parent.right; top: parent.top }
         spacing: Theme.gap / 2
-        visible: plot.buttons
+        visible: plot.tools
         width: visible ? implicitWidth : 0
         PlotButton_ { objectName: "pause"; text: plot.paused ? qsTr("Live") : qsTr("Pause"); onClicked: plot.paused = !plot.paused }
         PlotButton_ { objectName: "zoomIn"; text: "+"; Accessible.name: qsTr("Show less time"); onClicked: plotted.zoom(0.5, 1) }
         PlotButton_ { objectName: "zoomOut"; text: "−"; Accessible.name: qsTr("Show more time"); onClicked: plotted.zoom(2, 1) }
         PlotButton_ { objectName: "fit"; text: qsTr("Fit"); Accessible.name: qsTr("Fit the axes to the data"); onClicked: plot.fit() }
-        PlotButton_ { visible: plot.saveFolder !== ""; text: qsTr("CSV"); Accessible.name: qsTr("Save as CSV"); onClicked: plot.save_(".csv") }
-        PlotButton_ { visible: plot.saveFolder !== ""; text: qsTr("PNG"); Accessible.name: qsTr("Save as PNG"); onClicked: plot.save_(".png") }
+        PlotButton_ { visible: plot.folder !== ""; text: qsTr("CSV"); Accessible.name: qsTr("Save as CSV"); onClicked: plot.save_(".csv") }
+        PlotButton_ { visible: plot.folder !== ""; text: qsTr("PNG"); Accessible.name: qsTr("Save as PNG"); onClicked: plot.save_(".png") }
     }
 
     Item {

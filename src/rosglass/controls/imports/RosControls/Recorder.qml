@@ -1,6 +1,8 @@
 // Records topics to an MCAP file or a ROS 1 bag, with limits and event marks.
 import QtQuick 2.15
 import RosControls 1.0
+import "fields.js" as Fields
+import "units.js" as Units
 
 LiveFrame {
     id: control
@@ -28,20 +30,20 @@ LiveFrame {
     // Whether the file is being completed.
     readonly property alias completing: recorder.completing
     // The file of the present or last recording.
-    readonly property alias path: recorder.path
+    readonly property alias file: recorder.file
     // Why the last recording ended.
     readonly property alias ending: recorder.ending
     // Seconds, bytes, messages, lost messages, and event marks of the present or last recording.
     readonly property alias elapsed: recorder.elapsed
     readonly property alias size: recorder.size
-    readonly property alias messages: recorder.messages
+    readonly property alias messageCount: recorder.messageCount
     readonly property alias dropped: recorder.dropped
-    readonly property alias marks: recorder.marks
+    readonly property alias markCount: recorder.markCount
     // Bytes that are free on the disk; -1 while unknown.
     readonly property alias free: recorder.free
 
     // A recording is complete: its file (empty if nothing was recorded), and why it ended.
-    signal finished(string path, string reason)
+    signal finished(string file, string reason)
     // A recording did not begin, or ended by this error.
     signal failed(string reason)
 
@@ -50,27 +52,18 @@ LiveFrame {
     // Writes an event mark; returns whether it was written.
     function mark(text) { return recorder.mark(text === undefined ? "" : text) }
 
-    function bytes_(count) {
-        return count < 0 ? "?" : count < 1e6 ? qsTr("%1 kB").arg((count / 1e3).toFixed(0))
-            : count < 1e9 ? qsTr("%1 MB").arg((count / 1e6).toFixed(1)) : qsTr("%1 GB").arg((count / 1e9).toFixed(1))
-    }
-    function time_(seconds) {
-        const two = value => (value < 10 ? "0" : "") + value
-        const whole = Math.floor(seconds), hours = Math.floor(whole / 3600)
-        return (hours ? hours + ":" : "") + two(Math.floor(whole / 60) % 60) + ":" + two(whole % 60)
-    }
 
     title: qsTr("Recorder")
     stale: false
-    problem: recorder.problem.slice(0, 300)
-    note: free < 0 ? "" : qsTr("%1 free").arg(bytes_(free))
+    problem: Fields.bounded(recorder.problem)
+    note: free < 0 ? "" : qsTr("%1 free").arg(Units.bytes(free))
     contentWidth: 300 * Theme.size
     contentHeight: column.implicitHeight
     Accessible.description: status || progress.text
 
     TopicRecorder {
         id: recorder
-        onFinished: function(path, reason) { control.finished(path, reason) }
+        onFinished: function(file, reason) { control.finished(file, reason) }
         onFailed: function(reason) { control.failed(reason) }
     }
 
@@ -108,7 +101,7 @@ LiveFrame {
             ThemeText {
                 objectName: "time"
                 anchors.verticalCenter: parent.verticalCenter
-                text: control.time_(control.elapsed)
+                text: Units.clock(control.elapsed)
                 color: control.recording ? Theme.text : Theme.dim
                 font.pixelSize: Theme.large
             }
@@ -136,14 +129,14 @@ LiveFrame {
                 const parts = []
                 if (control.recording && !control.elapsed)
                     return qsTr("starting ...")
-                if (!control.recording && !control.path)
+                if (!control.recording && !control.file)
                     return qsTr("not recording")
-                parts.push(control.bytes_(control.size) + (control.sizeLimit > 0 ? " / " + control.bytes_(control.sizeLimit) : ""))
+                parts.push(Units.bytes(control.size) + (control.sizeLimit > 0 ? " / " + Units.bytes(control.sizeLimit) : ""))
                 if (control.timeLimit > 0)
-                    parts.push(qsTr("at most %1").arg(control.time_(control.timeLimit)))
-                parts.push(qsTr("%1 messages").arg(control.messages))
-                if (control.marks)
-                    parts.push(qsTr("%1 marks").arg(control.marks))
+                    parts.push(qsTr("at most %1").arg(Units.clock(control.timeLimit)))
+                parts.push(qsTr("%1 messages").arg(control.messageCount))
+                if (control.markCount)
+                    parts.push(qsTr("%1 marks").arg(control.markCount))
                 if (control.dropped)
                     parts.push(qsTr("%1 LOST: the disk is too slow").arg(control.dropped))
                 return parts.join(" · ")
@@ -155,8 +148,8 @@ LiveFrame {
             objectName: "file"
             width: parent.width
             visible: text !== ""
-            text: !control.path || control.problem ? "" : control.recording ? control.path
-                : control.completing ? qsTr("completing %1").arg(control.path) : control.size > 0 ? qsTr("%1: %2").arg(control.ending).arg(control.path) : control.ending
+            text: !control.file || control.problem ? "" : control.recording ? control.file
+                : control.completing ? qsTr("completing %1").arg(control.file) : control.size > 0 ? qsTr("%1: %2").arg(control.ending).arg(control.file) : control.ending
             color: Theme.dim
             elide: Text.ElideMiddle
             font.pixelSize: Theme.small
@@ -165,8 +158,8 @@ LiveFrame {
             objectName: "warning"
             width: parent.width
             visible: text !== ""
-            text: control.free >= 0 && control.free < control.lowSpace ? qsTr("DISK NEARLY FULL: %1 free").arg(control.bytes_(control.free))
-                : control.recording && recorder.missing ? qsTr("not recorded: %1").arg(recorder.missing.slice(0, 200)) : ""
+            text: control.free >= 0 && control.free < control.lowSpace ? qsTr("DISK NEARLY FULL: %1 free").arg(Units.bytes(control.free))
+                : control.recording && recorder.missing ? qsTr("not recorded: %1").arg(Fields.bounded(recorder.missing, 200)) : ""
             color: Theme.warn
             font.pixelSize: Theme.small
         }

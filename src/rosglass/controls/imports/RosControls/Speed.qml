@@ -1,6 +1,7 @@
 // How fast the robot drives and turns, from nav_msgs/Odometry or a Twist; and why it does not.
 import QtQuick 2.15
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: speed
@@ -107,7 +108,7 @@ LiveFrame {
         horizontalAlignment: Text.AlignHCenter
         wrapMode: Text.Wrap
         maximumLineCount: 3
-        text: qsTr("NOT DRIVING: %1").arg(speed.refusal.slice(0, 300))
+        text: qsTr("NOT DRIVING: %1").arg(Fields.bounded(speed.refusal))
         color: Theme.bad
         font.weight: Font.Bold
     }

@@ -4,6 +4,8 @@ import QtQuick 2.15
 import QtQuick.Templates 2.15 as T
 import Ros2 1.0
 import RosControls 1.0
+import "fields.js" as Fields
+import "units.js" as Units
 
 LiveFrame {
     id: timeline
@@ -44,11 +46,6 @@ LiveFrame {
             seek(found)
     }
 
-    function time_(seconds) {
-        const two = value => (value < 10 ? "0" : "") + value
-        const tenths = Math.floor(seconds * 10 + 1e-6), whole = Math.floor(tenths / 10), hours = Math.floor(whole / 3600)
-        return (hours ? hours + ":" : "") + two(Math.floor(whole / 60) % 60) + ":" + two(whole % 60) + "." + tenths % 10
-    }
     function faster_(by) {
         if (!replay_)
             return
@@ -60,12 +57,12 @@ LiveFrame {
 
     title: qsTr("Recording")
     stale: false
-    problem: replay_ && replay_.problem ? replay_.problem.slice(0, 300) : !ready && (file || replay) ? qsTr("NO RECORDING YET") : ""
+    problem: replay_ && replay_.problem ? Fields.bounded(replay_.problem) : !ready && (file || replay) ? qsTr("NO RECORDING YET") : ""
     note: !ready ? (problem ? "" : qsTr("no recording is shown")) : playing ? (replay_.rate !== 1 ? qsTr("playing, %1 x").arg(replay_.rate) : qsTr("playing")) : qsTr("PAUSED")
     contentWidth: 420 * Theme.size
     contentHeight: slider.height + row.height + Theme.gap / 2
     activeFocusOnTab: true
-    Accessible.description: status || qsTr("%1 of %2").arg(time_(position)).arg(time_(duration))
+    Accessible.description: status || qsTr("%1 of %2").arg(Units.clock(position, true)).arg(Units.clock(duration, true))
 
     Keys.onPressed: function(event) {
         const far = step * (event.modifiers & Qt.ShiftModifier ? 10 : 1)
@@ -138,7 +135,7 @@ LiveFrame {
                 height: slider.height / 2 - 2
                 color: Theme.warn
                 Accessible.role: Accessible.StaticText
-                Accessible.name: qsTr("%1: %2").arg(timeline.time_(modelData.time)).arg(modelData.text.slice(0, 100))
+                Accessible.name: qsTr("%1: %2").arg(Units.clock(modelData.time, true)).arg(Fields.bounded(modelData.text, 100))
                 MouseArea {
                     anchors { fill: parent; margins: -4 }
                     hoverEnabled: true
@@ -200,7 +197,7 @@ LiveFrame {
             objectName: "time"
             anchors.verticalCenter: parent.verticalCenter
             width: Math.max(0, Math.min(implicitWidth, row.width - x))
-            text: qsTr("%1 / %2").arg(timeline.time_(timeline.position)).arg(timeline.time_(timeline.duration))
+            text: qsTr("%1 / %2").arg(Units.clock(timeline.position, true)).arg(Units.clock(timeline.duration, true))
             color: timeline.ready ? Theme.text : Theme.dim
         }
         ThemeText {

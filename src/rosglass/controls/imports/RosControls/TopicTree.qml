@@ -2,6 +2,7 @@
 import QtQuick 2.15
 import Ros2 1.0
 import RosControls 1.0
+import "units.js" as Units
 
 LiveFrame {
     id: view
@@ -20,10 +21,6 @@ LiveFrame {
     // Enter, or a double click on a topic.
     signal activated(string topic)
 
-    function bytes_(size) {
-        return size >= 1e6 ? qsTr("%1 MB").arg((size / 1e6).toFixed(1))
-            : size >= 1e3 ? qsTr("%1 kB").arg((size / 1e3).toFixed(1)) : qsTr("%1 B").arg(size.toFixed(0))
-    }
 
     title: qsTr("Topics")
     source: topics
@@ -158,7 +155,7 @@ LiveFrame {
                 visible: view.measures
                 text: measured.problem ? measured.problem
                     : measured.frequency > 0 ? qsTr("%1 Hz, %2/s, %3 each").arg(measured.frequency.toPrecision(3))
-                        .arg(view.bytes_(measured.bandwidth)).arg(view.bytes_(measured.bandwidth / measured.frequency))
+                        .arg(Units.bytes(measured.bandwidth)).arg(Units.bytes(measured.bandwidth / measured.frequency))
                     : qsTr("nothing received in the last seconds")
                 color: measured.problem ? Theme.warn : Theme.dim
                 wrapMode: Text.Wrap
