@@ -126,6 +126,16 @@ def test_a_click_stops_and_a_long_press_releases(controls: Any, wait: Any, latch
     assert latch.commands == [True, False]
 
 
+@pytest.mark.parametrize("name", ["Shift", "Control", "Alt", "Meta"])
+def test_the_key_stops_with_a_modifier(controls: Any, wait: Any, latch: Latch, name: str) -> None:
+    """The hand that drives may hold one."""
+    stop = show(controls, wait)
+    modifier = getattr(QtCore.Qt.KeyboardModifier, f"{name}Modifier")
+    test.keyClick(controls.window, Key.Key_Space, modifier)
+    assert stop.property("blocks")
+    wait(lambda: latch.stopped)
+
+
 def test_an_unconfirmed_stop_is_said_and_sent_again(controls: Any, wait: Any, latch: Latch) -> None:
     latch.obeys = False
     stop = show(controls, wait)

@@ -41,7 +41,7 @@ SCREEN = """Item {
     }
     Item {
         id: page_
-        anchors.fill: parent
+        width: parent.width; height: parent.height
         Item { id: a_; objectName: "a"; width: 20; height: 20 }
         Item { id: b_; objectName: "b"; width: 20; height: 20 }
     }
@@ -204,6 +204,27 @@ def hide_window(drive: Drive) -> None:
     drive.controls.window.setProperty("visible", False)
 
 
+def fade_out(drive: Drive) -> None:
+    drive.screen.property("page").setProperty("opacity", 0)
+
+
+def shrink(drive: Drive) -> None:
+    drive.screen.property("page").setProperty("scale", 0)
+
+
+def scroll_away(drive: Drive) -> None:
+    """As a SwipeView does that is narrower than its window."""
+    drive.screen.property("a").setProperty("y", 120)
+    drive.screen.property("page").setProperty("height", 100)
+    drive.screen.property("page").setProperty("clip", True)
+
+
+def scroll_away_without_a_size(drive: Drive) -> None:
+    """An item without a size is where the item around it is."""
+    drive.screen.property("page").setProperty("x", 10_000)
+    drive.screen.property("a").setProperty("width", 0)
+
+
 def open_window(drive: Drive) -> None:
     drive.screen.openOther()
 
@@ -241,6 +262,10 @@ def change_clock(drive: Drive) -> None:
     [
         (hide_page, "the control is not visible"),
         (move_away, "the control is not visible"),
+        (fade_out, "the control is not visible"),
+        (shrink, "the control is not visible"),
+        (scroll_away, "the control is not visible"),
+        (scroll_away_without_a_size, "the control is not visible"),
         (disable, "the control is disabled"),
         (hide_window, "the window is not"),
         (open_window, "the window is not in front"),

@@ -87,7 +87,7 @@ def obstruction(item: QtQuick.QQuickItem | QtGui.QWindow | None) -> str:
     window: Any = item
     if isinstance(item, QtQuick.QQuickItem):
         window = window_of(item)
-        if window is None or not item.isVisible() or _is_outside(item, window):
+        if window is None or not item.isVisible() or _is_unseen(item, window):
             return "the control is not visible"
         if not item.isEnabled():
             return "the control is disabled"
@@ -116,12 +116,23 @@ def _contains(outer: Any, inner: Any) -> bool:
     return bool(outer.isAncestorOf(inner, QtGui.QWindow.AncestorMode.ExcludeTransients))
 
 
-def _is_outside(item: QtQuick.QQuickItem, window: QtQuick.QQuickWindow) -> bool:
-    """Return whether an item is outside its window, as the hidden pages of a SwipeView are."""
-    shown = item.mapRectToScene(item.boundingRect())
-    return not shown.isEmpty() and not shown.intersects(
-        QtCore.QRectF(0, 0, window.width(), window.height())
-    )
+def _is_unseen(item: QtQuick.QQuickItem, window: QtQuick.QQuickWindow) -> bool:
+    """Return whether an item is transparent, cut off or outside, as on a SwipeView's other page.
+
+    An item without a size is where the next one around it is that has one.
+    """
+    shown, seen = None, QtCore.QRectF(0, 0, window.width(), window.height())
+    one: Any = item
+    while one is not None:
+        if one.opacity() == 0:
+            return True
+        box = one.boundingRect()
+        if shown is None and not box.isEmpty():
+            shown = one.mapRectToScene(box)
+        elif one.clip():
+            seen &= one.mapRectToScene(one.clipRect())
+        one = one.parentItem()
+    return shown is not None and not shown.intersects(seen)
 
 
 def _has_modal_popup(window: Any) -> bool:

@@ -97,6 +97,17 @@ Item {
         begin_()
     }
 
+    // The hand that stops may hold Shift or another modifier; a Shortcut takes each for a key of its own.
+    function sequences_() {
+        let made = []
+        for (const key of stopKeys) {
+            const plain = typeof key === "string" && (key === "+" || key.indexOf("+") < 0)
+            for (const modifier of plain ? ["", "Shift+", "Ctrl+", "Ctrl+Shift+", "Alt+", "Meta+"] : [""])
+                made.push(modifier ? modifier + key : key)
+        }
+        return made
+    }
+
     // Releasing takes a deliberate long press, of the finger or of the key.
     function beginHold() {
         if (blocks)
@@ -290,7 +301,7 @@ Item {
     // -- keys: not by Keys, which depends on the focus; and Shortcut knows no release --
 
     Shortcut {
-        sequences: stop.stopKeys
+        sequences: stop.sequences_()
         context: Qt.ApplicationShortcut
         autoRepeat: false
         onActivated: Stops.press()
