@@ -406,6 +406,8 @@ class GoalHandle(QtCore.QObject):
     def _on_done(self, goal: ClientGoal) -> None:
         if not is_alive(self) or self._over:
             return
+        # Of a goal that ends at once, the end may be notified first.
+        self._on_acceptance(goal.acceptance)
         error = goal.done.exception(0)
         if error is None:
             end = goal.done.result(0)
