@@ -174,3 +174,29 @@ def test_types_that_only_the_robot_has(
         wait(lambda: live_controls.find("said").property("text") == "dug 1.5")
         button.call()
         wait(lambda: button.property("status") == "REFUSED: no sand")
+
+
+def test_goals_have_a_button_each_and_an_obstacle_disables_them(
+    controls: Any, counter: Any, wait: Any
+) -> None:
+    counter.offer()
+    panel = controls.show("""ActionPanel {
+        action: "/count"
+        goals: [{text: "Three", goal: {order: 3}}, {text: "Five", goal: {order: 5}}]
+        describe: function(message) { return message.sequence.length + " numbers" }
+    }""")
+    wait(lambda: controls.find("goal1").isEnabled())
+    assert not controls.find("send").isVisible()
+    click(controls, "goal1")
+    wait(lambda: panel.property("outcome") == "succeeded")
+    assert controls.find("state").property("text") == "Five: done"
+    assert controls.find("said").property("text") == "5 numbers"
+    panel.setProperty("obstacle", "emergency stop")
+    assert not controls.find("goal1").isEnabled()
+    assert panel.property("status") == "emergency stop"
+    panel.send({"order": 3})
+    assert controls.find("state").property("text") == "REFUSED"
+    assert controls.find("said").property("text") == "emergency stop"
+    panel.setProperty("obstacle", "")
+    panel.setProperty("hold", True)
+    assert controls.find("holdGoal1").isVisible()

@@ -186,3 +186,15 @@ def test_modes_over_a_real_middleware(live_controls: Any, wait: Any) -> None:
     wait(lambda: modes.property("note") == "auto" and not modes.property("pending"))
     keep.close()
     state.close()
+
+
+def test_a_repeated_mode_that_falls_silent_is_out_of_date(controls: Any, wait: Any) -> None:
+    state = controls.robot.create_publisher("/mode/state", STRING, QoS.latched())
+    state.publish(data="manual")
+    modes = controls.show('ModeSwitch { stateTimeout: 200; modes: ["manual"] }')
+    wait(lambda: modes.property("note") == "manual")
+    wait(lambda: modes.property("stale"))
+    assert not controls.find("mode0").property("confirmed")
+    state.publish(data="manual")
+    wait(lambda: not modes.property("stale"))
+    state.close()

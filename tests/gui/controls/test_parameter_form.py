@@ -8,6 +8,7 @@ import pytest
 from hands import click, key
 
 from rosglass.comm.parameters import ParameterDescriptor, ParameterType, Range
+from rosglass.qt import QtCore
 
 pytestmark = pytest.mark.both_qt
 
@@ -180,3 +181,21 @@ def test_parameters_over_a_real_middleware(live_controls: Any, url: str, wait: A
         )
         wait(lambda: whole.property("ready"))
         assert row_or_none(live_controls, "robot/speed") is not None
+
+
+def test_ranges_are_given_where_the_node_has_none(controls: Any, robot: Any, wait: Any) -> None:
+    show(controls, wait, 'ranges: ({"arm.count": [1, 9], speed: [0, 99]})')
+    slider = controls.find("editor", row(controls, "arm.count"))
+    assert (slider.property("from"), slider.property("to")) == (1, 9)
+    speed = controls.find("editor", row(controls, "speed"))
+    assert speed.property("to") == 2, "the node's own range counts"
+
+
+def test_names_are_above_the_values_in_a_narrow_form(controls: Any, robot: Any, wait: Any) -> None:
+    show(controls, wait)
+    wide, slider = row(controls, "speed"), controls.find("editor", row(controls, "speed"))
+    assert slider.mapToItem(wide, QtCore.QPointF()).y() == 0
+    controls.window.setWidth(230)
+    wait(lambda: slider.mapToItem(wide, QtCore.QPointF()).y() > 10)
+    assert slider.width() > 100
+    assert slider.mapToItem(wide, QtCore.QPointF()).y() + slider.height() < wide.height()

@@ -156,3 +156,10 @@ def test_button_may_go_while_it_waits(controls: Any, wait: Any, caplog: Any) -> 
     wait.settled(controls.engine_session)
     assert "TypeError" not in caplog.text
     assert "ReferenceError" not in caplog.text
+
+
+def test_status_can_be_shown_elsewhere(controls: Any, wait: Any) -> None:
+    button = controls.show('ServiceButton { service: "/lamp"; showStatus: false }')
+    wait(lambda: "NOT AVAILABLE" in button.property("status"))
+    assert not controls.find("status").isVisible()
+    assert button.property("implicitHeight") == controls.find("button").height()

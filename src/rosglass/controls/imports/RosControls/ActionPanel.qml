@@ -14,12 +14,16 @@ LiveFrame {
     property string type
     // The goal's fields; without one, the operator fills in a form.
     property var goal: undefined
+    // Goals to choose from, each a {text, goal} with a button of its own, instead of `goal` or a form.
+    property var goals: []
     property string sendText: qsTr("Send")
     // Whether a goal is sent only after the button has been held down, for `holdTime` seconds.
     property bool hold: false
     property real holdTime: 1
     // Milliseconds for a server to accept a goal.
     property int timeout: 10000
+    // Why goals cannot be sent now; empty if they can.
+    property string obstacle
     // Returns the progress, 0 to 1, of a feedback; by default, of the fields that commonly have it.
     property var progressOf: null
     // Returns the text shown for a feedback or a result; by default, its first fields.
@@ -36,7 +40,7 @@ LiveFrame {
     readonly property string state_: active && !ready ? qsTr("NO CONTACT: it may still be running")
         : outcome_ === "" ? (ready ? qsTr("ready") : "")
         : outcome_ === "sent" ? qsTr("sent, not accepted yet")
-        : outcome_ === "running" ? qsTr("running")
+        : outcome_ === "running" ? (stale ? qsTr("it may still be running") : qsTr("running"))
         : outcome_ === "canceling" ? qsTr("canceling ...")
         : outcome_ === "succeeded" ? qsTr("done")
         : outcome_ === "canceled" ? qsTr("CANCELLED")
@@ -76,12 +80,17 @@ LiveFrame {
     property int left_: 0
     property string formType_
     property string formProblem_
-    readonly property bool form_: goal === undefined || goal === null
+    readonly property bool form_: (goal === undefined || goal === null) && !goals.length
+    readonly property bool sendable_: ready && !active && obstacle === ""
+    // The text of the goal's button.
+    property string chosen_
+    readonly property string of_: chosen_ && outcome_ !== "" ? qsTr("%1: ").arg(chosen_) : ""
 
     title: action
     stale: !ready
     age: 0
     problem: wrong_ ? wrong_
+        : obstacle ? obstacle
         : !ready ? qsTr("NOT AVAILABLE: %1").arg(client_ && client_.problem ? Fields.bounded(client_.problem, 120) : qsTr("no server of %1 yet").arg(name_))
         : ""
     note: active ? qsTr("%1 s").arg(elapsed.toFixed(0)) : ""
@@ -91,8 +100,18 @@ LiveFrame {
 
     // Sends a goal: `given`, or `goal`, or the form's. The panel has one goal at a time.
     function send(given) {
+        send_(given, "")
+    }
+
+    function send_(given, name) {
         if (handle_ || !client_)
             return
+        chosen_ = Fields.bounded(name, 60)
+        if (obstacle) {
+            outcome_ = "refused"
+            said_ = Fields.bounded(obstacle)
+            return
+        }
         let value = given !== undefined ? given : goal
         if (value === undefined || value === null) {
             value = readForm_()
@@ -351,26 +370,48 @@ LiveFrame {
                 color: Theme.warn
                 font.pixelSize: Theme.small
             }
-            Row {
+            Grid {
                 width: parent.width
-                spacing: Theme.gap
+                columns: 2
+                spacing: panel.goals.length ? Theme.gap / 2 : Theme.gap
                 readonly property real half: (width - spacing) / 2
 
+                Repeater {
+                    model: panel.hold ? [] : panel.goals
+                    ThemeButton {
+                        objectName: "goal" + index
+                        width: parent.half
+                        text: modelData.text
+                        enabled: panel.sendable_
+                        onClicked: panel.send_(panel.goals[index].goal, modelData.text)
+                    }
+                }
+                Repeater {
+                    model: panel.hold ? panel.goals : []
+                    ThemeHoldButton {
+                        objectName: "holdGoal" + index
+                        width: parent.half
+                        text: modelData.text
+                        delay: Math.round(1000 * (panel.holdTime > 0 ? panel.holdTime : 1))
+                        enabled: panel.sendable_
+                        onActivated: panel.send_(panel.goals[index].goal, modelData.text)
+                    }
+                }
                 ThemeButton {
                     objectName: "send"
                     width: parent.half
-                    visible: !panel.hold
+                    visible: !panel.hold && !panel.goals.length
                     text: panel.sendText
-                    enabled: panel.ready && !panel.active && (!panel.form_ || panel.formType_ !== "")
+                    enabled: panel.sendable_ && (!panel.form_ || panel.formType_ !== "")
                     onClicked: panel.send()
                 }
                 ThemeHoldButton {
                     objectName: "holdSend"
                     width: parent.half
-                    visible: panel.hold
+                    visible: panel.hold && !panel.goals.length
                     text: panel.sendText
                     delay: Math.round(1000 * (panel.holdTime > 0 ? panel.holdTime : 1))
-                    enabled: panel.ready && !panel.active && (!panel.form_ || panel.formType_ !== "")
+                    enabled: panel.sendable_ && (!panel.form_ || panel.formType_ !== "")
                     onActivated: panel.send()
                 }
                 ThemeButton {
@@ -406,7 +447,7 @@ LiveFrame {
                 text: {
                     if (panel.cancelProblem_ || panel.formProblem_)
                         return panel.cancelProblem_ || panel.formProblem_
-                    const parts = [panel.state_]
+                    const parts = [panel.of_ + panel.state_]
                     if (panel.active && panel.ready && !isNaN(panel.progress))
                         parts.push(qsTr("%1 %").arg((100 * panel.progress).toFixed(0)))
                     if (panel.active && panel.feedback !== undefined && panel.silence_ > 3)

@@ -22,6 +22,8 @@ LiveFrame {
     property string type
     // Milliseconds until a request is said to be unconfirmed.
     property int timeout: 2000
+    // Milliseconds after which a mode that the robot repeats is out of date; 0 for one that it does not repeat.
+    property int stateTimeout: 0
     // Why modes cannot be changed now; empty if they can.
     property string obstacle
 
@@ -244,7 +246,7 @@ LiveFrame {
         ns: modeSwitch.ns
         types: ["std_msgs/msg/String"].concat(modeSwitch.integers_)
         qos: Ros2.BestAvailableQoS()
-        timeout: 0
+        timeout: modeSwitch.stateTimeout
     }
     LiveTopic {
         enabled: modeSwitch.nodeName !== ""

@@ -15,6 +15,8 @@ LiveFrame {
     property string filter
     // Lists of values by parameter name, for parameters whose descriptors do not list them.
     property var choices: ({})
+    // Lists of the least and greatest value by parameter name, for descriptors without a range (ROS 1 has none).
+    property var ranges: ({})
     // Whether values can be changed.
     property bool editable: true
 
@@ -117,7 +119,7 @@ LiveFrame {
             id: row
             objectName: "row_" + model.name
             width: list.width - (bar.visible ? bar.width + 4 : 0)
-            height: Theme.touch + (detail.text ? detail.implicitHeight + 2 : 0)
+            height: Theme.touch + (narrow ? label.height : 0) + (detail.text ? detail.implicitHeight + 2 : 0)
 
             readonly property string name: model.name
             readonly property string type: model.type
@@ -125,8 +127,11 @@ LiveFrame {
             readonly property var value: model.value
             readonly property bool locked: model.readOnly || !form.editable
             readonly property bool usable: form.ready && !locked
-            readonly property real low: model.minimum
-            readonly property real high: model.maximum
+            // Too little room for the name beside the value.
+            readonly property bool narrow: width < 300 * Theme.size
+            readonly property var range: form.ranges[name] || []
+            readonly property real low: model.maximum > model.minimum || range.length !== 2 ? model.minimum : range[0]
+            readonly property real high: model.maximum > model.minimum || range.length !== 2 ? model.maximum : range[1]
             readonly property real step: model.stepSize
             readonly property var choices: form.choices[name] || model.choices
             readonly property bool isNumber: type === "integer" || type === "double"
@@ -138,8 +143,8 @@ LiveFrame {
 
             ThemeText {
                 id: label
-                anchors { left: parent.left; top: parent.top; right: editor.left; rightMargin: Theme.gap }
-                height: Theme.touch
+                anchors { left: parent.left; top: parent.top; right: row.narrow ? parent.right : editor.left; rightMargin: row.narrow ? 0 : Theme.gap }
+                height: row.narrow ? Theme.normal * 1.5 : Theme.touch
                 text: row.name
                 color: model.changed ? Theme.accent : row.locked ? Theme.dim : Theme.text
                 elide: Text.ElideLeft
@@ -147,8 +152,8 @@ LiveFrame {
             }
             Loader {
                 id: editor
-                anchors { right: parent.right; top: parent.top }
-                width: parent.width * 0.55
+                anchors { right: parent.right; top: row.narrow ? label.bottom : parent.top }
+                width: parent.width * (row.narrow ? 1 : 0.55)
                 height: Theme.touch
                 opacity: model.pending ? 0.5 : 1
                 sourceComponent: row.locked ? lockedEditor
@@ -159,7 +164,7 @@ LiveFrame {
             ThemeText {
                 id: detail
                 objectName: "detail"
-                anchors { left: parent.left; right: parent.right; top: label.bottom }
+                anchors { left: parent.left; right: parent.right; top: editor.bottom }
                 text: row.problem ? qsTr("REFUSED: %1").arg(row.problem)
                     : model.external ? qsTr("changed by the robot or another client")
                     : [model.description, model.constraints].filter(part => part !== "").join(" · ")

@@ -20,6 +20,8 @@ Item {
     property real holdTime: 1
     // Milliseconds to wait for the answer; a call from code waits as long for a server.
     property int timeout: 10000
+    // Whether `status` is shown below the button; several buttons may have one line in common.
+    property bool showStatus: true
     property color tint: hold ? Theme.warn : Theme.accent
     // Returns why the server refused, by its response; empty if it did not.
     property var refusalOf: null
@@ -57,7 +59,7 @@ Item {
     property int number_: 0
 
     implicitWidth: Math.max(button_.implicitWidth, 160 * Theme.size)
-    implicitHeight: Theme.touch + Theme.small * 1.5
+    implicitHeight: Theme.touch + (showStatus ? Theme.small * 1.5 : 0)
     Accessible.role: Accessible.Grouping
     Accessible.name: text
     Accessible.description: status
@@ -171,6 +173,7 @@ Item {
     }
     ThemeText {
         objectName: "status"
+        visible: control.showStatus
         anchors { left: parent.left; right: parent.right; top: button.bottom; topMargin: 2 }
         text: control.status
         color: control.busy ? Theme.dim : !control.ready || control.outcome === "refused" || control.outcome === "failed" ? Theme.bad

@@ -6,6 +6,9 @@ T.AbstractButton {
     id: button
 
     property color tint: Theme.accent
+    // Whether it is shown as the chosen one of several, or as on.
+    property bool selected: false
+    readonly property bool lit_: down || checked || selected
 
     function press_() {
         if (checkable)
@@ -19,6 +22,7 @@ T.AbstractButton {
     hoverEnabled: true
     Accessible.role: checkable ? Accessible.CheckBox : Accessible.Button
     Accessible.name: text
+    Accessible.checked: checked || selected
     Accessible.onPressAction: press_()
     Keys.onReturnPressed: press_()
     Keys.onEnterPressed: press_()
@@ -26,14 +30,14 @@ T.AbstractButton {
     contentItem: ThemeText {
         id: label
         text: button.text
-        color: !button.enabled ? Theme.faint : button.down || button.checked ? Theme.onAccent : button.tint
+        color: !button.enabled ? Theme.faint : button.lit_ ? Theme.onAccent : button.tint
         font.weight: Font.DemiBold
         horizontalAlignment: Text.AlignHCenter
         verticalAlignment: Text.AlignVCenter
     }
     background: Rectangle {
         radius: Theme.radius
-        color: !button.enabled ? "transparent" : button.down || button.checked ? button.tint
+        color: !button.enabled ? "transparent" : button.lit_ ? button.tint
             : button.hovered ? Theme.track : "transparent"
         border { color: button.enabled ? button.tint : Theme.faint; width: 1 }
         FocusRing { item: parent; visible: button.visualFocus }
