@@ -1,10 +1,11 @@
 // The current time.
 import QtQuick 2.15
+import RosControls 1.0
 
 Rectangle {
-    width: 118; height: 46
-    radius: 6
-    color: Theme.background
+    width: 150 * Theme.size; height: 54 * Theme.size
+    radius: Theme.radius
+    color: Theme.panel
     border.color: Theme.edge
     property date now: new Date()
     Timer {
@@ -12,18 +13,17 @@ Rectangle {
         running: true; repeat: true
         onTriggered: { now = new Date(); interval = 1000 - now.getMilliseconds() }
     }
-    Text {
-        x: 10; y: 4
-        textFormat: Text.PlainText
-        text: Qt.formatTime(now, "hh:mm:ss")
-        color: Theme.text
-        font { pixelSize: 21; weight: Font.Light }
-    }
-    Text {
-        x: 11; y: 29
-        textFormat: Text.PlainText
-        text: Qt.formatDate(now, "ddd d MMM yyyy")
-        color: Theme.dim
-        font.pixelSize: 10
+    Column {
+        x: Theme.gap
+        anchors.verticalCenter: parent.verticalCenter
+        ThemeText {
+            text: Qt.formatTime(now, "hh:mm:ss")
+            font { pixelSize: Theme.large * 1.2; weight: Font.Light }
+        }
+        ThemeText {
+            text: Qt.formatDate(now, "ddd d MMM yyyy")
+            color: Theme.dim
+            font.pixelSize: Theme.small
+        }
     }
 }

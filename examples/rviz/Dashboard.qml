@@ -4,15 +4,28 @@
 //   rosglass view figure1.rviz --overlay Dashboard.qml --kiosk
 import QtQuick 2.15
 import QtQuick.Layouts 1.15
-import Ros 1.0
+import Ros2 1.0
+import RosControls 1.0
 
 Item {
     id: dashboard
-    Component.onCompleted: Ros.init("dashboard")
+    Component.onCompleted: Ros2.init("dashboard")
+
+    // Dense on a small screen, larger on a large one.
+    Binding { target: Theme; property: "scale"; value: Math.max(0.85, Math.min(2, dashboard.height / 940, dashboard.width / 1500)) }
 
     Contact { id: contact }
-    Clock { x: Theme.gap; y: Theme.gap }
-    ToolButtons { x: Theme.gap; y: 62 }
+    Column {
+        x: Theme.gap; y: Theme.gap
+        spacing: Theme.gap
+        Clock {}
+        ToolButtons {}
+    }
+    ViewControls {
+        anchors { right: parent.right; top: parent.top; margins: Theme.gap }
+        width: 226 * Theme.size
+        live: contact.live
+    }
     Notices {
         contact: contact
         anchors { horizontalCenter: parent.horizontalCenter; top: parent.top; topMargin: Theme.gap }
@@ -22,29 +35,36 @@ Item {
         anchors { left: parent.left; right: parent.right; bottom: parent.bottom }
         height: Math.max(Math.min(250, parent.height * 0.45), Math.min(parent.height / 3, 420))
         // Opaque: blending is slow without a graphics card.
-        color: Theme.bar
+        color: Theme.background
 
         RowLayout {
             anchors { fill: parent; margins: Theme.gap }
             spacing: Theme.gap
 
-            ColumnLayout {
-                Layout.preferredWidth: 158; Layout.fillWidth: false; Layout.fillHeight: true
-                spacing: Theme.gap
-                ViewControls { live: contact.live; Layout.fillWidth: true; Layout.preferredHeight: 98 }
-                EmergencyStop { Layout.fillWidth: true; Layout.fillHeight: true }
+            EmergencyStop {
+                objectName: "emergency stop"
+                topic: "/emergency_stop"
+                Layout.preferredWidth: 186 * Theme.size; Layout.fillHeight: true
             }
             // Beside panels there is room for what drives the robot, and one camera.
             ColumnLayout {
-                visible: dashboard.width >= 800
-                Layout.preferredWidth: 216; Layout.fillWidth: false; Layout.fillHeight: true
+                visible: dashboard.width >= 1050 * Theme.size
+                Layout.preferredWidth: 312 * Theme.size; Layout.fillWidth: false; Layout.fillHeight: true
                 spacing: Theme.gap
-                Posture { Layout.fillWidth: true; Layout.fillHeight: true }
                 RowLayout {
-                    Layout.fillWidth: true; Layout.fillHeight: false; Layout.preferredHeight: 106
+                    Layout.fillWidth: true; Layout.fillHeight: true
                     spacing: Theme.gap
-                    OperatingMode { Layout.fillWidth: true; Layout.fillHeight: true }
-                    Battery { Layout.preferredWidth: 92; Layout.fillHeight: true }
+                    Posture { Layout.fillWidth: true; Layout.fillHeight: true }
+                    Battery {
+                        topic: "/battery_state"
+                        Layout.preferredWidth: 136 * Theme.size; Layout.fillHeight: true
+                    }
+                }
+                ModeSwitch {
+                    objectName: "mode"
+                    stateTopic: "/mode"; service: "/mode/%1"; stateTimeout: 2000
+                    modes: ["autonomous", "supervised", "safe"]
+                    Layout.fillWidth: true; Layout.preferredHeight: implicitHeight
                 }
             }
             MultiCamera {
@@ -52,11 +72,11 @@ Item {
                 selected: 0
             }
             MultiCamera {
-                visible: dashboard.width >= 1000
+                visible: dashboard.width >= 1340 * Theme.size
                 Layout.fillWidth: true; Layout.preferredWidth: 300; Layout.fillHeight: true
                 selected: 1
             }
-            Tabs { live: contact.live; Layout.preferredWidth: 236; Layout.fillHeight: true }
+            Tabs { live: contact.live; Layout.preferredWidth: 296 * Theme.size; Layout.fillHeight: true }
         }
     }
 }

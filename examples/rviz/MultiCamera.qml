@@ -1,8 +1,9 @@
-// One of several cameras. An image that is not live is marked.
+// One of several cameras.
 import QtQuick 2.15
-import Ros 1.0
+import QtQuick.Layouts 1.15
+import RosControls 1.0
 
-Panel {
+Item {
     id: panel
     property var cameras: [
         {name: "Front", topic: "/camera/image_raw"}, {name: "Rear", topic: "/rear_camera/image_raw"},
@@ -10,41 +11,26 @@ Panel {
         {name: "Thermal", topic: "/thermal_camera/image_raw"}
     ]
     property int selected: 0
-    title: cameras[selected].name + " camera"
-    stale: camera.stale
-    dims: false
-    note: camera.framerate.toFixed(0) + " Hz   " + Math.max(0, camera.latency).toFixed(0) + " ms"
 
-    ImageTransportSubscriber {
-        id: camera
+    CameraView {
+        anchors { left: parent.left; right: parent.right; top: parent.top; bottom: choice.top; bottomMargin: Theme.gap / 2 }
         topic: panel.cameras[panel.selected].topic
-        defaultTransport: "raw"
+        title: panel.cameras[panel.selected].name + " camera"
+        transport: "raw"
         timeout: 1000
+        tools: false
     }
-    ImageItem {
-        anchors { fill: parent; bottomMargin: choice.height + 5 }
-        source: camera
-    }
-    Text {
-        anchors { centerIn: parent; verticalCenterOffset: -choice.height / 2 }
-        visible: camera.stale
-        text: "NO IMAGE"
-        color: Theme.bad
-        font { pixelSize: 20; weight: Font.Black }
-    }
-    Flow {
+    RowLayout {
         id: choice
-        anchors { bottom: parent.bottom; horizontalCenter: parent.horizontalCenter }
-        // In one row if there is room.
-        width: Math.min(parent.width, 243)
-        spacing: 3
+        anchors { left: parent.left; right: parent.right; bottom: parent.bottom }
+        spacing: Theme.gap / 2
         Repeater {
             model: panel.cameras
-            Push {
+            ThemeButton {
                 objectName: "camera " + modelData.name
-                height: 21; size: 10
+                Layout.fillWidth: true
                 text: modelData.name
-                checked: index === panel.selected
+                selected: index === panel.selected
                 onClicked: panel.selected = index
             }
         }

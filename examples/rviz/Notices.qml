@@ -1,25 +1,27 @@
 // Notices in the middle of the 3D view: which data is old, and the outcome of a goal.
 import QtQuick 2.15
-import Ros 1.0
+import Ros2 1.0
+import RosControls 1.0
 
 Column {
     id: notices
     property Contact contact
-    spacing: 6
+    spacing: Theme.gap * 0.7
 
     component Notice: Rectangle {
         property string text
         property color tint: Theme.bad
         anchors.horizontalCenter: parent.horizontalCenter
-        width: label.implicitWidth + 32; height: 30
-        radius: 6
-        color: Theme.bar
+        width: label.implicitWidth + 3 * Theme.gap; height: Theme.touch
+        radius: Theme.radius
+        color: Theme.panel
         border { color: tint; width: 2 }
-        Text {
-            id: label; textFormat: Text.PlainText; text: parent.text
+        ThemeText {
+            id: label
             anchors.centerIn: parent
+            text: parent.text.slice(0, 200)
             color: parent.tint
-            font { pixelSize: 14; weight: Font.DemiBold }
+            font { pixelSize: Theme.normal * 1.2; weight: Font.DemiBold }
         }
     }
     Repeater {
@@ -28,9 +30,9 @@ Column {
     }
 
     // A goal of RViz's tool 2D Nav Goal, from the status of move_base.
-    Subscriber {
+    LiveTopic {
         id: status
-        topic: "/move_base/status"; messageType: "actionlib_msgs/GoalStatusArray"; timeout: 2000
+        topic: "/move_base/status"; types: ["actionlib_msgs/msg/GoalStatusArray"]; timeout: 2000
         property string last
         onNewMessage: function (message) {
             var goals = message.status_list, goal = goals.length ? goals.at(goals.length - 1) : null

@@ -1,31 +1,33 @@
 // Mission, behaviours, settings.
 import QtQuick 2.15
+import QtQuick.Layouts 1.15
+import RosControls 1.0
 
-Panel {
-    id: panel
+Item {
+    id: tabs
     property bool live
     property int current: 0
     readonly property var names: ["Mission", "Behaviours", "Settings"]
 
-    Row {
-        y: -18
+    RowLayout {
+        id: bar
         width: parent.width
-        spacing: 4
+        spacing: Theme.gap / 2
         Repeater {
-            model: panel.names
-            Push {
+            model: tabs.names
+            ThemeButton {
                 objectName: "tab " + modelData
-                width: (panel.width - 24) / 3; height: 24
+                Layout.fillWidth: true
                 text: modelData
-                checked: index === panel.current
-                onClicked: panel.current = index
+                selected: index === tabs.current
+                onClicked: tabs.current = index
             }
         }
     }
     Item {
-        anchors { fill: parent; topMargin: 14 }
-        Mission { live: panel.live; anchors.fill: parent; visible: panel.current === 0 }
-        Behaviours { live: panel.live; anchors.fill: parent; visible: panel.current === 1 }
-        Settings { live: panel.live; anchors.fill: parent; visible: panel.current === 2 }
+        anchors { fill: parent; topMargin: bar.height + Theme.gap / 2 }
+        Mission { live: tabs.live; anchors.fill: parent; visible: tabs.current === 0 }
+        Behaviours { live: tabs.live; anchors.fill: parent; visible: tabs.current === 1 }
+        Settings { live: tabs.live; anchors.fill: parent; visible: tabs.current === 2 }
     }
 }

@@ -1,17 +1,17 @@
 // The position of RViz's camera, and whether it follows the robot.
 import QtQuick 2.15
-import QtQuick.Layouts 1.15
+import RosControls 1.0
 
-Panel {
+LiveFrame {
     id: panel
-    title: "View"
     property bool live
     property string failure
+
+    title: "View"
     // A silent robot is not followed: RViz keeps showing its last position.
-    stale: !live
-    dims: false
-    alarming: note === "NO ROBOT"
-    note: failure || rviz.view.problem ? "NO ROBOT" : rviz.view.trackedFrame ? "following" : ""
+    problem: !live || failure || rviz.view.problem ? "NO ROBOT" : ""
+    note: rviz.view.trackedFrame ? "following" : ""
+    contentHeight: grid.height
 
     function look(eye) {
         failure = ""
@@ -31,33 +31,32 @@ Panel {
             running = panel.failure !== ""
         }
     }
-    GridLayout {
-        anchors.fill: parent
+    Grid {
+        id: grid
+        width: parent.width
         columns: 3
-        rowSpacing: 5; columnSpacing: 5
-        Push { Layout.fillWidth: true; Layout.fillHeight: true; text: "Behind"; onClicked: look([-3.0, 0, 2.5]) }
-        Push { Layout.fillWidth: true; Layout.fillHeight: true; text: "Above"; onClicked: look([-0.4, 0, 7]) }
-        Push { Layout.fillWidth: true; Layout.fillHeight: true; text: "Front"; onClicked: look([3.2, 0, 1.4]) }
-        Push {
-            Layout.fillWidth: true; Layout.fillHeight: true
+        spacing: Theme.gap / 2
+        component Choice: ThemeButton { width: (grid.width - 2 * grid.spacing) / 3 }
+        Choice { text: "Behind"; onClicked: look([-3.0, 0, 2.5]) }
+        Choice { text: "Above"; onClicked: look([-0.4, 0, 7]) }
+        Choice { text: "Front"; onClicked: look([3.2, 0, 1.4]) }
+        Choice {
             text: "2D"
-            checked: rviz.view.mode === rviz.view.MODE_2D
+            selected: rviz.view.mode === rviz.view.MODE_2D
             onClicked: rviz.view.setMode(rviz.view.MODE_2D)
         }
-        Push {
-            Layout.fillWidth: true; Layout.fillHeight: true
+        Choice {
             text: "3D"
-            checked: rviz.view.mode === rviz.view.MODE_3D
+            selected: rviz.view.mode === rviz.view.MODE_3D
             onClicked: rviz.view.setMode(rviz.view.MODE_3D)
         }
-        Push {
-            Layout.fillWidth: true; Layout.fillHeight: true
+        Choice {
             text: "Follow"
-            checked: rviz.view.trackedFrame !== ""
+            selected: rviz.view.trackedFrame !== ""
             onClicked: {
                 panel.failure = ""
                 try {
-                    rviz.view.track(checked ? "" : "base_link")
+                    rviz.view.track(selected ? "" : "base_link")
                 } catch (error) {
                     panel.failure = error.message
                 }

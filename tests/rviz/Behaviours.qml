@@ -1,8 +1,8 @@
 import QtQuick 2.15
-import Ros 1.0
+import Ros2 1.0
 import "../../examples/rviz" as Example
 
 Item {
-    Component.onCompleted: Ros.init("behaviours")
+    Component.onCompleted: Ros2.init("behaviours")
     Example.Behaviours { live: true; width: 220 }
 }

@@ -23,8 +23,9 @@ PATIENCE = 60.0
 #: Seconds that RViz may take to end beside other programs: after 1.7 s it ends in any case.
 ENDING = 10.0
 #: Positions on a screen of 1280x800.
-STOP, BEHAVIOURS, FLIPPERS_UP = (90, 720), (1153, 560), (1153, 648)
-PICTURES = {"front camera": (432, 566, 256, 180), "rear camera": (747, 566, 256, 180)}
+STOP, UNLOCK = (90, 720), (90, 608)
+BEHAVIOURS, FLIPPERS_UP = (1140, 557), (1085, 652)
+PICTURES = {"front camera": (462, 560, 256, 180), "rear camera": (746, 560, 256, 180)}
 GRAB = """
 import sys
 from rosglass.rviz.qt5 import QtGui
@@ -200,12 +201,13 @@ def test_an_operator_sees_stops_and_commands_the_robot(robot: Robot, rviz: Rviz)
     eventually(lambda: robot.stopped and robot.speed < 0.01, rviz.evidence(robot), timeout=PATIENCE)
     # A click does not release it, a long press does.
     rviz.click(STOP)
+    rviz.click(UNLOCK)
     nothing_happens(1.0)
     assert robot.stopped
 
     def released() -> bool:
-        """Press long, and again: a press stops when the robot has just not been heard of."""
-        rviz.press(STOP)
+        """Press long, and again: it is not released when its counter has just not been received."""
+        rviz.press(UNLOCK)
         time.sleep(1.5)
         rviz.release()
         time.sleep(2.0)

@@ -66,21 +66,28 @@ def test_goals_feedback_cancelling_and_failures(app: Any, wait: Any, server: Non
     root = app.add_qml(HERE / "Behaviours.qml").root
     behaviours = root.childItems()[0]
 
-    def texts() -> list[str]:
-        items = [root]
-        for item in items:
-            items.extend(item.childItems())
-        return [item.property("text") for item in items if item.inherits("QQuickText")]
+    def items() -> list[Any]:
+        found = [root]
+        for item in found:
+            found.extend(item.childItems())
+        return found
+
+    def texts() -> set[str]:
+        return {item.property("text") for item in items() if item.inherits("QQuickText")}
 
     def click(name: str) -> None:
         wait(lambda: behaviours.property("ready") and not behaviours.property("active"))
-        behaviours.start(name)
+        named = [item for item in items() if item.property("text") == name]
+        (button,) = [item for item in named if item.objectName().startswith("goal")]
+        wait(button.isEnabled)
+        button.clicked.emit()
 
     click("Look around")
-    wait(lambda: "Look around: done, finished" in texts())
+    wait(lambda: {"Look around: done", "finished"} <= texts())
     click("Turn around")
-    wait(lambda: "Turn around: turning" in texts())
-    behaviours.property("goal").cancel()
-    wait(lambda: "Turn around: cancelled" in texts())
+    wait(lambda: {"Turn around: running", "turning"} <= texts())
+    behaviours.cancel()
+    wait(lambda: "Turn around: CANCELLED" in texts())
     click("Flippers up")
-    wait(lambda: "Flippers up: failed: the flippers are jammed" in texts())
+    wait(lambda: "Flippers up: FAILED" in texts(), texts)
+    wait(lambda: any("the flippers are jammed" in text for text in texts()))

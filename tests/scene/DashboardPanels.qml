@@ -10,7 +10,8 @@ Item {
     Dashboard { id: dashboard; anchors.fill: parent }
 
     function texts(item, found) {
-        if (item.visible && item.textFormat !== undefined && item.text)
+        // ROS 1 has no descriptions of parameters.
+        if (item.visible && item.textFormat !== undefined && item.text && item.objectName !== "detail")
             found.push(item.text)
         for (let i = 0; item.visible && i < item.children.length; ++i)
             texts(item.children[i], found)
@@ -19,9 +20,8 @@ Item {
     function panels(item, found) {
         if (item.names !== undefined && item.current !== undefined)
             tabs = item
-        const name = item === tabs ? tabs.names[tabs.current] : item.title
-        if (item.stale !== undefined && name)
-            found[name] = texts(item, [])
+        if ((item.stale !== undefined || item.live !== undefined) && item.title && item.framed !== false && item.visible)
+            found[item.title] = texts(item, [])
         for (let i = 0; i < item.children.length; ++i)
             panels(item.children[i], found)
         return found
