@@ -346,6 +346,17 @@ def test_a_lost_connection_halts_and_gets_its_zeros_later(drive: Drive) -> None:
     drive.stops("the robot is not connected: the cable is out")
 
 
+def test_robot_that_leaves_halts_although_others_listen(drive: Drive) -> None:
+    recorder = drive.controls.robot.create_subscription(
+        "/cmd_vel", "geometry_msgs/msg/Twist", print
+    )
+    drive.go()
+    recorder.close()
+    drive.wait(lambda: drive.robot.zeros >= 3)
+    assert drive.reasons() == ["/cmd_vel has lost a subscriber"]
+    drive.wait(lambda: "let go first" in drive.command.property("refusal"))
+
+
 def test_destruction_sends_the_zeros(controls: Any, wait: Any) -> None:
     robot = Robot(controls.robot)
     holder = controls.show("""Item {

@@ -441,8 +441,9 @@ class TwistCommand(Element):
             self._show()
 
     def _on_matched(self, event: Matched) -> None:
-        if is_alive(self) and event.change < 0 and not event.count and self._endpoint is not None:
-            self._halt(f"{self._endpoint.publisher.topic} has no subscriber any more")
+        # Any of them: the one that left may be the robot, and the others recorders.
+        if is_alive(self) and event.change < 0 and self._endpoint is not None:
+            self._halt(f"{self._endpoint.publisher.topic} has lost a subscriber")
 
     @Slot()
     def _on_graph(self) -> None:
