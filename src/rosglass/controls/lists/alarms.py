@@ -8,7 +8,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from rosglass.controls.lists.diagnostics import ERROR, RANK, STALE, WARN, DiagnosticsTopic
-from rosglass.controls.lists.row_model import RowModel, bounded
+from rosglass.controls.lists.row_model import RowModel
+from rosglass.controls.lists.texts import bounded
 from rosglass.qml.engine.log import declared_at, log_from_qml
 from rosglass.qml.engine.properties import ReadOnly, Writable, one_of, report
 from rosglass.qt import QtCore, Signal, Slot, is_alive, optional

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.names import hidden
 from rosglass.controls.lists.layered_layout import Layout, lay_out
-from rosglass.controls.lists.rows import Rows, copy_text, joined
+from rosglass.controls.lists.rows import Rows
+from rosglass.controls.lists.texts import copy_text, joined
 from rosglass.controls.lists.topic_rows import read_topics
 from rosglass.qml.elements.element import Element, single_shot
 from rosglass.qml.engine.dialect import resolve_namespace

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.qos import QoS
 from rosglass.controls.lists.joint_limits import JointLimits, read_joint_limits
 from rosglass.controls.lists.merged_topic import MergedTopic
-from rosglass.controls.lists.row_model import bounded
+from rosglass.controls.lists.texts import bounded
 from rosglass.errors import Error
 from rosglass.qml.engine.properties import ReadOnly, Writable, one_of, report, within
 from rosglass.qt import is_alive

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.controls.lists.merged_topic import MergedTopic
-from rosglass.controls.lists.row_model import bounded
+from rosglass.controls.lists.texts import bounded
 from rosglass.qml.engine.properties import ReadOnly, Writable, report, within
 from rosglass.qt import QtGui, Slot
 

@@ -8,7 +8,8 @@ import struct
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.qos import QoS
-from rosglass.controls.lists.rows import Rows, copy_text, plain_line
+from rosglass.controls.lists.rows import Rows
+from rosglass.controls.lists.texts import bounded, copy_text
 from rosglass.controls.topics.live_topic import LiveTopic
 from rosglass.errors import ConversionError, Error
 from rosglass.qml.elements.message_item_model import TreeItem, check_leaf, plain_tree
@@ -190,7 +191,7 @@ class MessageRows(LiveTopic):
         if role == "type":
             return str(member.field.type) if item.is_array else member.field.type.name
         if role == "comment":
-            return plain_line(" ".join(member.field.comment.split()))
+            return bounded(" ".join(member.field.comment.split()))
         return member.field.unit
 
     def _path(self, field: _Field) -> str:
@@ -205,7 +206,7 @@ class MessageRows(LiveTopic):
         """Return a value in one line."""
         value = item.value
         if item.is_leaf:
-            return plain_line(value) if isinstance(value, str) else _number(item, value)
+            return bounded(value) if isinstance(value, str) else _number(item, value)
         if item.is_array:
             count = len(value)
             member = item.member

@@ -1,12 +1,10 @@
-"""Rows for lists in QML, and robots' texts in them."""
+"""Rows for lists in QML."""
 # ruff: noqa: N802 - the names of Qt's methods
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import escape_controls
 from rosglass.qt import QtCore, Signal
 
 if TYPE_CHECKING:
@@ -14,31 +12,12 @@ if TYPE_CHECKING:
 
     _Index = QtCore.QModelIndex | QtCore.QPersistentModelIndex
 
-__all__ = ["RowModel", "bounded"]
+__all__ = ["RowModel"]
 
 #: Value of Qt.ItemDataRole.UserRole: using its name would make PySide load all enumerations.
 _USER = 0x0100
 #: Rows that are moved, added or removed one by one; a list with more changes is shown anew.
 _MOST_STEPS = 100
-_SURROGATE = re.compile("[\ud800-\udfff]")
-
-
-def bounded(text: str, most: int = 500, *, lines: bool = False) -> str:
-    """Return a robot's text with at most `most` characters, and how many it has if it has more.
-
-    Control characters are escaped, and bytes that are not UTF-8 become U+FFFD.
-
-    Args:
-        text: The text.
-        most: Characters to keep.
-        lines: Whether it may have several lines.
-    """
-    cut = text[:most]
-    if not (cut.isascii() and cut.isprintable()):
-        cut = escape_controls(_SURROGATE.sub("\N{REPLACEMENT CHARACTER}", cut))
-        if not lines:
-            cut = cut.replace("\n", " ⏎ ").replace("\t", " ")
-    return cut if len(text) <= most else f"{cut}… ({len(text)} characters)"
 
 
 class RowModel(QtCore.QAbstractListModel):

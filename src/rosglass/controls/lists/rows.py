@@ -6,34 +6,15 @@ from __future__ import annotations
 import itertools
 from typing import TYPE_CHECKING, Any
 
-from rosglass.qt import QtCore, QtGui, Signal, Slot
+from rosglass.qt import QtCore, Signal, Slot
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-__all__ = ["Rows", "copy_text", "joined", "plain_line"]
+__all__ = ["Rows"]
 
 #: The first role that a model may use.
 _USER = 0x0100
-#: Names that a text lists before it counts the rest, and letters of a line.
-_MAX_NAMES, _MAX_LETTERS = 20, 300
-
-
-def joined(names: Sequence[str], most: int = _MAX_NAMES) -> str:
-    """Return names in one line, the rest counted: ``/a, /b and 3 more``."""
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most:,} more"
-
-
-def plain_line(text: str, most: int = _MAX_LETTERS) -> str:
-    """Return a robot's text in one line: control characters escaped, the rest counted."""
-    shown = "".join(one if one.isprintable() else repr(one)[1:-1] for one in text[:most])
-    return shown if len(text) <= most else f"{shown} … and {len(text) - most:,} more characters"
-
-
-def copy_text(text: str) -> None:
-    """Put a text into the clipboard."""
-    QtGui.QGuiApplication.clipboard().setText(text)
 
 
 class Rows(QtCore.QAbstractListModel):

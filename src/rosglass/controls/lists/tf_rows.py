@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.controls.lists.rows import Rows, copy_text, plain_line
+from rosglass.controls.lists.rows import Rows
+from rosglass.controls.lists.texts import bounded, copy_text
 from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS
 from rosglass.qml.elements.tf_buffer import TfBuffer
 from rosglass.qml.engine.properties import ReadOnly, Writable, at_least, report
@@ -149,11 +150,11 @@ class TfRows(TfBuffer):
             is_open = unfolded or name not in self._folded
             is_moving = frame.parent != "" and not frame.static
             rows[name] = _row(
-                plain_line(name), depth=depth, folds=bool(below), open=is_open,
-                parentFrame=plain_line(frame.parent), authority=frame.authority,
+                bounded(name), depth=depth, folds=bool(below), open=is_open,
+                parentFrame=bounded(frame.parent), authority=frame.authority,
                 isStatic=frame.static, age=round(frame.silence, 1) if is_moving else -1.0,
                 rate=float(f"{frame.rate:.3g}"), isOld=self._is_old(frame),
-                fault=plain_line(faults.get(name, "")),
+                fault=bounded(faults.get(name, "")),
             )  # fmt: skip
             if is_open:
                 waiting += [(one, depth + 1) for one in reversed(below)]

@@ -6,7 +6,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.names import hidden
-from rosglass.controls.lists.rows import Rows, copy_text, joined
+from rosglass.controls.lists.rows import Rows
+from rosglass.controls.lists.texts import copy_text, joined
 from rosglass.qml.elements.element import Element, single_shot
 from rosglass.qml.engine.dialect import resolve_namespace
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
