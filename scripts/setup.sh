@@ -23,7 +23,7 @@ apt_demo=(xvfb xauth libegl1 libgl1 libopengl0 libxkbcommon-x11-0 libdbus-1-3 li
           libgl1-mesa-dri fonts-dejavu-core)
 # Debian's own Python for the RViz environment, ROS 1's message generator to compare with, a private
 # network for DDS, Fast DDS to talk to, and ROS 1 itself: master, tools, rospy, roscpp, actionlib,
-# catkin; Vulkan on the processor for the 3D view.
+# catkin; Vulkan on the processor for the 3D view; accessibility as a screen reader sees it.
 apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps
           iproute2 util-linux g++ pkg-config libfastrtps-dev
           python3-rosmaster python3-roslaunch rosout python3-rospy python3-actionlib
@@ -33,6 +33,7 @@ apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps
           python3-actionlib-msgs python3-tf2-msgs python3-tf2-ros python3-trajectory-msgs
           python3-shape-msgs python3-stereo-msgs python3-map-msgs python3-pcl-msgs python3-bond
           python3-interactive-markers mesa-vulkan-drivers libvulkan1
+          python3-pyatspi at-spi2-core dbus-daemon
           catkin ros-message-generation ros-message-runtime ros-std-msgs ros-geometry-msgs
           libroscpp-dev libactionlib-dev libstd-msgs-dev
           libstd-srvs-dev libgeometry-msgs-dev libsensor-msgs-dev)

@@ -16,7 +16,10 @@ T.ComboBox {
     hoverEnabled: true
     Accessible.role: Accessible.ComboBox
     Accessible.name: name ? name + ": " + displayText : displayText
-    Keys.onReturnPressed: popup.visible ? popup.close() : popup.open()
+    Accessible.onPressAction: toggle_()
+    Keys.onReturnPressed: toggle_()
+
+    function toggle_() { popup.visible ? popup.close() : popup.open() }
 
     contentItem: ThemeText {
         text: choice.displayText
