@@ -60,7 +60,7 @@ LiveFrame {
                 objectName: "level" + index
                 implicitHeight: Theme.touch * 0.75
                 text: log.letters_[index] + " " + (log.counts[index] < 10000 ? log.counts[index] : Math.floor(log.counts[index] / 1000) + "k")
-                tint: index >= log.minLevel ? log.tints_[index] : Theme.faint
+                tint: index < log.minLevel ? Theme.dim : index ? log.tints_[index] : Theme.accent
                 Accessible.name: qsTr("show from %1, %2 messages").arg(log.names_[index]).arg(log.counts[index])
                 onClicked: log.minLevel = index
             }

@@ -196,7 +196,7 @@ LiveFrame {
                 height: parent.height
                 verticalAlignment: Text.AlignVCenter
                 text: row.type
-                color: Theme.faint
+                color: Theme.dim
                 font.pixelSize: Theme.small
             }
             Item {

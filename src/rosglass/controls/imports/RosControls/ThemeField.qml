@@ -16,7 +16,7 @@ T.TextField {
     color: enabled ? Theme.text : Theme.faint
     selectionColor: Theme.accent
     selectedTextColor: Theme.onAccent
-    placeholderTextColor: Theme.faint
+    placeholderTextColor: Theme.dim
     selectByMouse: true
     font.pixelSize: Theme.normal
     Accessible.role: Accessible.EditableText
