@@ -110,6 +110,7 @@ Item {
 
     // Releasing takes a deliberate long press, of the finger or of the key.
     function beginHold() {
+        unlock.progress = 0
         if (blocks)
             hold.restart()
     }
@@ -446,15 +447,16 @@ Item {
             minimumPixelSize: 8
             font.weight: Font.DemiBold
         }
-        NumberAnimation {
+        // In steps, not by the clock: after a screen that stood still, a release that waits is handled first.
+        Timer {
             id: hold
-            target: unlock
-            property: "progress"
-            from: 0
-            to: 1
-            duration: 700
-            onFinished: {
-                unlock.progress = 0
+            interval: 35
+            repeat: true
+            onTriggered: {
+                unlock.progress += 0.05
+                if (unlock.progress < 0.999)
+                    return
+                stop.cancelHold()
                 stop.release()
             }
         }
