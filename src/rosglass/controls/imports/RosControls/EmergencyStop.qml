@@ -447,13 +447,17 @@ Item {
             minimumPixelSize: 8
             font.weight: Font.DemiBold
         }
-        // In steps, not by the clock: after a screen that stood still, a release that waits is handled first.
+        // By the clock, but at most 100 ms a step: after a screen that stood still, a release that waits is handled first.
         Timer {
             id: hold
+            property real last: 0
             interval: 35
             repeat: true
+            onRunningChanged: last = Date.now()
             onTriggered: {
-                unlock.progress += 0.05
+                const now = Date.now()
+                unlock.progress += Math.max(0, Math.min(100, now - last)) / 700
+                last = now
                 if (unlock.progress < 0.999)
                     return
                 stop.cancelHold()
