@@ -158,7 +158,7 @@ class Cockpit:
     def topics(self) -> list[Any]:
         """Return the interface's subscriptions, one for each topic, by topic."""
         found = {item.property("topic"): item for item in self.window.findChildren(Subscription)}
-        return [found[topic] for topic in sorted(found)]
+        return [found[topic] for topic in sorted(found) if topic]
 
     def received(self, topic: str) -> bool:
         """Return whether a message of the topic was ever received."""

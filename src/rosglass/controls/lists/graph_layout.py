@@ -11,22 +11,18 @@ from rosglass.controls.lists.layered_layout import Layout, lay_out
 from rosglass.controls.lists.rows import Rows
 from rosglass.controls.lists.texts import copy_text, joined
 from rosglass.controls.lists.topic_rows import read_topics
-from rosglass.qml.elements.element import Element, single_shot
+from rosglass.controls.topics.graph_watch import GraphReader
 from rosglass.qml.engine.dialect import resolve_namespace
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
-from rosglass.qml.engine.session import weak_callback
-from rosglass.qt import QtCore, Slot, is_alive
+from rosglass.qt import QtCore, Slot
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from rosglass.comm.node import Node
-    from rosglass.errors import Error
 
 __all__ = ["GraphLayout"]
 
-#: Milliseconds between two layouts.
-_PAUSE_MS = 500
 #: Nodes, topics and connections that are drawn at most; a filter finds the others.
 _MAX_VERTICES, _MAX_EDGES = 400, 1000
 #: Names that nearly every node is connected to.
@@ -62,19 +58,19 @@ class _Drawn(NamedTuple):
     omitted: int
 
 
-class GraphLayout(Element):
+class GraphLayout(GraphReader):
     """The graph of nodes and topics. See its page in ``docs/controls``."""
 
     #: Text that names of nodes or topics contain; what is connected to these is drawn, too.
-    filter = Writable(str, "", then="_look")
+    filter = Writable(str, "", then="_read")
     #: Namespace of nodes or topics; empty for all.
-    ns = Writable(str, "", then="_look")
+    ns = Writable(str, "", then="_read")
     #: Names of nodes and topics that are left out.
-    hide = Writable(list, _HIDE, lambda names: [str(name) for name in names], then="_look")
+    hide = Writable(list, _HIDE, lambda names: [str(name) for name in names], then="_read")
     #: Whether hidden names are included, such as topics of actions.
-    showHidden = Writable(bool, False, then="_look")
+    showHidden = Writable(bool, False, then="_read")
     #: Whether topics are drawn; otherwise nodes are connected directly.
-    showTopics = Writable(bool, True, then="_look")
+    showTopics = Writable(bool, True, then="_read")
     #: Nodes and topics, for a Repeater.
     items = ReadOnly(QtCore.QObject, read=lambda self: self._model)
     #: The parts of all connections, each between two columns, for a Repeater.
@@ -87,43 +83,17 @@ class GraphLayout(Element):
     omitted = ReadOnly(int, 0)
     #: Counts layouts, so that bindings on functions of the models are evaluated again.
     version = ReadOnly(int, 0)
-    #: Whether the robot is not connected, so that this is the graph of before.
-    stale = ReadOnly(bool, True)
 
     _HOLDS = ("_model", "_segments", "_drawn")
+    _READ_INTERVAL_MS = 500
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
         self._model = Rows(self, _ROLES)
         self._segments = Rows(self, _SEGMENT_ROLES)
         self._drawn = _Drawn({}, {}, lay_out((), ()), 0)
-        self._looking = self._look_again = False
-        self._pause = single_shot(self, self._look)
 
-    def _update(self) -> None:
-        super()._update()
-        self._look()
-        self._judge()
-
-    @Slot()
-    def _on_graph(self) -> None:
-        self._look()
-
-    @Slot()
-    def _on_connection(self) -> None:
-        self._look()
-        self._judge()
-
-    @Slot()
-    def _look(self) -> None:
-        """Read and lay out the graph on the worker thread, at most twice per second."""
-        node, session = self.node, self._session
-        if node is None or session is None:
-            return
-        if self._looking or self._pause.isActive():
-            self._look_again = True
-            return
-        self._looking, self._look_again = True, False
+    def _reading(self, node: Node) -> Callable[[], _Drawn]:
         within = resolve_namespace(node, self.ns).rstrip("/") + "/" if self.ns else "/"
         wanted = _Wanted(
             self.filter.strip().lower(),
@@ -132,40 +102,25 @@ class GraphLayout(Element):
             self.showHidden,
             self.showTopics,
         )
-        session.background(lambda: _draw(node, wanted), weak_callback(self._on_drawn))
+        return lambda: _draw(node, wanted)
 
-    def _on_drawn(self, result: _Drawn | Error) -> None:
-        if not is_alive(self):
-            return
-        self._looking = False
-        if isinstance(result, _Drawn) and self._disconnected() == "":
-            self._drawn = result
-            self._model.show(result.vertices)
-            self._segments.show(result.segments)
-            layout = result.layout
-            report(
-                self,
-                columns=max(layout.columns.values(), default=-1) + 1,
-                lines=int(max(layout.rows.values(), default=-1)) + 1,
-                count=len(result.vertices),
-                omitted=result.omitted,
-                version=self.version + 1,
-            )
-        self._judge()
-        if self._look_again:
-            self._pause.start(_PAUSE_MS)
-
-    def _get_problem(self) -> str:
-        # Not logged: the session does that.
-        return self._disconnected() if self._session is not None else ""
-
-    def _judge(self) -> None:
-        self._announce_problem()
-        report(self, stale=self._disconnected() != "")
+    def _on_read(self, result: _Drawn) -> None:
+        self._drawn = result
+        self._model.show(result.vertices)
+        self._segments.show(result.segments)
+        layout = result.layout
+        report(
+            self,
+            columns=max(layout.columns.values(), default=-1) + 1,
+            lines=int(max(layout.rows.values(), default=-1)) + 1,
+            count=len(result.vertices),
+            omitted=result.omitted,
+            version=self.version + 1,
+        )
 
     @Slot(str, int, int, result=str)
     def neighbour(self, key: str, right: int, down: int) -> str:
-        """Return the nearest node or topic in a direction; `key` itself if there is none.
+        """Return the nearest node or topic in a direction; or `key` itself.
 
         Args:
             key: Key of a node or topic; if it is not drawn, the first one is returned.

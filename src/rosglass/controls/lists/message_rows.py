@@ -254,7 +254,7 @@ class MessageRows(LiveTopic):
 
     @Slot(result=bool)
     def edit(self) -> bool:
-        """Begin to edit a copy of the last message; return false if there is none.
+        """Begin to edit a copy of the last message; return false before the first message.
 
         Until :meth:`cancel`, received messages are not shown.
         """

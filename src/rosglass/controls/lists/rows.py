@@ -154,7 +154,7 @@ class Rows(QtCore.QAbstractListModel):
 
     @Slot(str, result=int)
     def find(self, key: str) -> int:
-        """Return the row of a key; -1 if there is none."""
+        """Return the row of a key, or -1."""
         return self._keys.index(key) if key in self._keys else -1
 
     @Slot(int, result=int)

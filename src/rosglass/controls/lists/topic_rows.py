@@ -8,23 +8,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rosglass.comm.names import hidden
 from rosglass.controls.lists.rows import Rows
 from rosglass.controls.lists.texts import copy_text, joined
-from rosglass.qml.elements.element import Element, single_shot
+from rosglass.controls.topics.graph_watch import GraphReader
 from rosglass.qml.engine.dialect import resolve_namespace
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
-from rosglass.qml.engine.session import weak_callback
-from rosglass.qt import QtCore, Slot, is_alive
+from rosglass.qt import QtCore, Slot
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from rosglass.comm.graph import EndpointInfo
     from rosglass.comm.node import Node
-    from rosglass.errors import Error
 
 __all__ = ["Topic", "TopicRows", "conflicts", "read_topics"]
 
-#: Milliseconds between two looks at the graph.
-_LOOK_MS = 250
 #: Topics that are shown at once, and conflicts of one topic.
 _MAX_TOPICS, _MAX_CONFLICTS = 5000, 5
 _ROLES = ("key", "name", "depth", "folds", "open", "isTopic", "topic", "type", "publishers",
@@ -104,7 +100,7 @@ def read_topics(node: Node) -> dict[str, Topic]:
     return found
 
 
-class TopicRows(Element):
+class TopicRows(GraphReader):
     """The topics of the robot as the rows of a tree. See its page in ``docs/controls``."""
 
     #: Text that names or types of topics contain; empty for all topics.
@@ -118,8 +114,6 @@ class TopicRows(Element):
     #: Topics that match, and all topics.
     count = ReadOnly(int, 0)
     total = ReadOnly(int, 0)
-    #: Whether the robot is not connected, so that this is the graph of before.
-    stale = ReadOnly(bool, True)
 
     _HOLDS = ("_model", "_topics", "_lines")
 
@@ -130,55 +124,15 @@ class TopicRows(Element):
         #: Namespaces that are folded, and topics whose details are shown.
         self._folded: set[str] = set()
         self._opened: set[str] = set()
-        self._looking = self._look_again = False
-        self._pause = single_shot(self, self._look)
 
     # -- the graph -------------------------------------------------------------------------------
 
-    def _update(self) -> None:
-        super()._update()
-        self._look()
-        self._judge()
+    def _reading(self, node: Node) -> Callable[[], dict[str, Topic]]:
+        return lambda: read_topics(node)
 
-    @Slot()
-    def _on_graph(self) -> None:
-        self._look()
-
-    @Slot()
-    def _on_connection(self) -> None:
-        self._look()
-        self._judge()
-
-    @Slot()
-    def _look(self) -> None:
-        """Read the graph on the worker thread, at most four times per second."""
-        node, session = self.node, self._session
-        if node is None or session is None:
-            return
-        if self._looking or self._pause.isActive():
-            self._look_again = True
-            return
-        self._looking, self._look_again = True, False
-        session.background(lambda: read_topics(node), weak_callback(self._on_looked))
-
-    def _on_looked(self, result: dict[str, Topic] | Error) -> None:
-        if not is_alive(self):
-            return
-        self._looking = False
-        if isinstance(result, dict) and self._disconnected() == "":
-            self._topics = result
-            self._show()
-        self._judge()
-        if self._look_again:
-            self._pause.start(_LOOK_MS)
-
-    def _get_problem(self) -> str:
-        # Not logged: the session does that.
-        return self._disconnected() if self._session is not None else ""
-
-    def _judge(self) -> None:
-        self._announce_problem()
-        report(self, stale=self._disconnected() != "")
+    def _on_read(self, result: dict[str, Topic]) -> None:
+        self._topics = result
+        self._show()
 
     # -- the rows --------------------------------------------------------------------------------
 

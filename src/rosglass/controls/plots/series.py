@@ -204,7 +204,7 @@ class TopicFeed:
         topic: Absolute name of the topic.
         fields: The fields.
         use_stamps: Whether times are those of the messages' headers, if they have any.
-        subscription: The subscription; None while there is none.
+        subscription: The subscription; None before it is created.
         problem: Why nothing is received, or in which way the times are not as expected.
         received: Number of messages.
         malformed: Number of messages that could not be read.

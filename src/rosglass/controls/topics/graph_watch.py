@@ -1,19 +1,24 @@
-"""The element ``GraphWatch``: the ROS graph for controls, without a call for every node of it."""
+"""The ROS graph for controls: the element ``GraphWatch``, and the base of elements that show it."""
 # ruff: noqa: N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.errors import Error
 from rosglass.qml.elements.element import Element, single_shot
-from rosglass.qml.engine.properties import ReadOnly
+from rosglass.qml.engine.properties import ReadOnly, report
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.node import Node
     from rosglass.qml.engine.runtime import Runtime
 
-__all__ = ["GraphWatch"]
+__all__ = ["GraphReader", "GraphWatch"]
 
 #: Milliseconds in which changes are collected: while robots start, there are hundreds.
 _COLLECT_MS = 200
@@ -79,3 +84,70 @@ class GraphWatch(Element):
     def _announce(self, *_: Any) -> None:
         if is_alive(self):
             self.changed.emit()
+
+
+class GraphReader(Element):
+    """Base of elements that show the ROS graph, which is read on the worker thread."""
+
+    #: Shortest time between two readings, in milliseconds.
+    _READ_INTERVAL_MS: ClassVar[int] = 250
+
+    #: Whether the robot is not connected, so that the graph shown is that of before.
+    stale = ReadOnly(bool, True)
+
+    def __init__(self, parent: QtCore.QObject | None = None) -> None:
+        super().__init__(parent)
+        self._is_reading = self._is_outdated = False
+        self._pause = single_shot(self, self._read)
+
+    @abstractmethod
+    def _reading(self, node: Node) -> Callable[[], Any]:
+        """Return a function that reads what is shown, for the worker thread."""
+
+    @abstractmethod
+    def _on_read(self, result: Any) -> None:
+        """Show what was read."""
+
+    def _update(self) -> None:
+        super()._update()
+        self._read()
+        self._update_stale()
+
+    @Slot()
+    def _on_graph(self) -> None:
+        self._read()
+
+    @Slot()
+    def _on_connection(self) -> None:
+        self._read()
+        self._update_stale()
+
+    @Slot()
+    def _read(self) -> None:
+        """Read the graph; again after a pause if it is being read, or was just now."""
+        node, session = self.node, self._session
+        if node is None or session is None:
+            return
+        if self._is_reading or self._pause.isActive():
+            self._is_outdated = True
+            return
+        self._is_reading, self._is_outdated = True, False
+        session.background(self._reading(node), weak_callback(self._end_reading))
+
+    def _end_reading(self, result: Any) -> None:
+        if not is_alive(self):
+            return
+        self._is_reading = False
+        if not isinstance(result, Error) and not self._disconnected():
+            self._on_read(result)
+        self._update_stale()
+        if self._is_outdated:
+            self._pause.start(self._READ_INTERVAL_MS)
+
+    def _get_problem(self) -> str:
+        # Not logged: the session does that.
+        return self._disconnected() if self._session is not None else ""
+
+    def _update_stale(self) -> None:
+        self._announce_problem()
+        report(self, stale=self._disconnected() != "")

@@ -46,7 +46,7 @@ class LiveValue(LiveTopic):
 
     #: Topic and field, as ``/odom:twist.twist.linear.x``.
     path = Writable(str, "", then="_set_parts")
-    #: The number; NaN while there is none.
+    #: The number; NaN without one.
     number = ReadOnly(float, math.nan)
 
     _path: str

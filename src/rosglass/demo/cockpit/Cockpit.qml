@@ -114,7 +114,7 @@ Item {
         MapView {
             id: map; objectName: "map"
             width: cockpit.wide ? parent.width : parent.half
-            height: side.mapTall; topic: "/map"; scans: ["/scan"]; follow: true
+            height: side.mapTall; topic: "/map"; scans: ["/scan"]
             tools: false
         }
         Attitude {
@@ -123,7 +123,7 @@ Item {
             y: cockpit.wide ? side.mapTall + Theme.gap : 0
             width: cockpit.wide ? side.half : (side.half - Theme.gap) / 2
             height: side.rowTall; topic: "/imu"
-            note: isNaN(roll) ? "" : pitch.toFixed(0) + "° / " + roll.toFixed(0) + "°"
+            note: isNaN(roll) ? "" : Math.round(pitch) + "° / " + Math.round(roll) + "°"
         }
         Battery {
             objectName: "battery"; x: attitude.x + attitude.width + Theme.gap
