@@ -357,6 +357,63 @@ def test_robot_that_leaves_halts_although_others_listen(drive: Drive) -> None:
     drive.wait(lambda: "let go first" in drive.command.property("refusal"))
 
 
+TWO = """Item {
+    anchors.fill: parent
+    property bool holdA: false
+    property bool holdB: false
+    property bool steersB: false
+    property string refusalB: second.refusal
+    component Command: TwistCommand {
+        topic: "/cmd_vel"; acceleration: 0; deceleration: 0; turnAcceleration: 0
+    }
+    Command { id: first }
+    Command { id: second }
+    Item { id: a; objectName: "a"; width: 20; height: 20 }
+    Item { id: b; objectName: "b"; width: 20; height: 20 }
+    Timer {
+        running: made.holdA; interval: 30; repeat: true; triggeredOnStart: true
+        onTriggered: first.steer(a, 1, 0)
+    }
+    Timer {
+        running: made.holdB; interval: 30; repeat: true; triggeredOnStart: true
+        onTriggered: made.steersB = second.steer(b, -1, 0)
+    }
+    onHoldAChanged: if (!holdA) first.release(a)
+    onHoldBChanged: if (!holdB) second.release(b)
+}"""
+
+
+def test_two_commands_of_a_topic_steer_one_at_a_time(controls: Any, wait: Any) -> None:
+    robot, screen = Robot(controls.robot), controls.show(TWO)
+    controls.window.requestActivate()
+    wait(controls.window.isActive)
+
+    def hold(name: str, speed: float) -> None:
+        """Hold an input until the robot moves; on a busy machine, more than once."""
+
+        def moves() -> bool:
+            screen.setProperty(name, False)
+            screen.setProperty(name, True)
+            wait.nothing_happens(0.1)
+            return bool(robot.speeds) and robot.speeds[-1] == speed
+
+        wait(moves)
+
+    hold("holdA", 0.5)
+    screen.setProperty("holdB", True)
+    wait(lambda: "a is held" in screen.property("refusalB"))
+    assert -0.5 not in robot.speeds
+    screen.setProperty("holdA", False)
+    wait(lambda: robot.zeros >= 3)
+    assert not screen.property("steersB"), "it was pressed while the other one was held"
+    screen.setProperty("holdB", False)
+    hold("holdB", -0.5)
+    # Within the second in which the first one's zeros would go on.
+    begin = len(robot.speeds)
+    wait(lambda: len(robot.speeds) > begin + 10)
+    assert set(robot.speeds[begin:]) == {-0.5}
+
+
 def test_destruction_sends_the_zeros(controls: Any, wait: Any) -> None:
     robot = Robot(controls.robot)
     holder = controls.show("""Item {

@@ -6,6 +6,7 @@ It does not need Qt: a screen that is frozen cannot keep it from stopping the ro
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from contextlib import suppress
@@ -158,6 +159,14 @@ class CommandSender(Handle):
         with self._changed:
             if self._held:
                 self._stop(self._clock())
+
+    def end_zeros(self) -> None:
+        """Send no more than the first zeros: another sender steers the robot now."""
+        with self._changed:
+            self._phase_at = -math.inf
+            if not self._held and self._zeros >= _ZEROS:
+                self._zero_at = None
+            self._changed.notify()
 
     def close(self) -> None:
         """Halt, wait for three zeros, and withdraw the publisher; safe to call twice."""

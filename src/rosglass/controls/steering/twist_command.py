@@ -37,6 +37,8 @@ _TYPES = (_TWIST, _STAMPED, _CAR, _CAR_STAMPED)
 #: Ticks of the session without steering after which an input counts as let go. They are counted
 #: on the GUI thread: while that is blocked, a held input cannot steer either.
 _SILENT_TICKS = 3
+#: Those that have a session, by id: those of one topic steer one at a time.
+_COMMANDS: dict[int, ref[TwistCommand]] = {}
 #: Errors that QML reports as warnings.
 _SCRIPT_ERROR = "Error"
 
@@ -224,6 +226,9 @@ class TwistCommand(Element):
         other = next((i for i in self._inputs.values() if i.held and i is not one), None)
         if other is not None and self._steers is not one:
             return f"{other.name} is held"
+        elsewhere = next((c._steers for c in self._others() if c._steers is not None), None)
+        if elsewhere is not None:
+            return f"{elsewhere.name} is held"
         if self._endpoint is None:
             return self._problem or self._disconnected() or "the topic is not advertised yet"
         return self._disconnected() or obstruction(one.shown)
@@ -234,6 +239,18 @@ class TwistCommand(Element):
             self._focus.start()
         self._steers = one
         self._endpoint.begin(*map(_unit, wanted))
+
+    def _others(self) -> list[TwistCommand]:
+        """Return the other commands of the same topic: each control without one makes its own."""
+        if self._endpoint is None:
+            return []
+        topic, commands = self._endpoint.publisher.topic, [one() for one in _COMMANDS.values()]
+        return [
+            one
+            for one in commands
+            if one is not None and one is not self and is_alive(one) and one.node is self.node
+            if one._endpoint is not None and one._endpoint.publisher.topic == topic
+        ]
 
     def _watch_window(self, one: _Input) -> None:
         window = window_of(one.shown) if isinstance(one.shown, QtQuick.QQuickItem) else one.shown
@@ -349,6 +366,9 @@ class TwistCommand(Element):
     def _find_session(self) -> bool:
         if not super()._find_session():
             return False
+        key = id(self)
+        _COMMANDS[key] = ref(self)
+        self._cleanup["commands"] = lambda: _COMMANDS.pop(key, None)  # type: ignore[assignment]
         app: Any = QtCore.QCoreApplication.instance()
         app.aboutToQuit.connect(self._on_quit)
         if self._session is not None:
