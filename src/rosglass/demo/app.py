@@ -69,6 +69,8 @@ class Cockpit:
         close_network()
         self.session = Session(url)
         self._closed = False
+        #: The stick's position without an operator: right, down.
+        self._pulled: tuple[float, float] | None = None
         self._runner = Runner(_QML, self.session)
         try:
             self._runner.load()
@@ -90,21 +92,25 @@ class Cockpit:
 
     def fly(self, plan: Sequence[tuple[float, float, float]] = AUTOPILOT) -> None:
         """Move the stick automatically by the mouse, as an operator would."""
-        for number, (begin, x, y) in enumerate(plan):
-            self.at(begin, lambda n=number, x=x, y=y: self._pull(n == 0, x, y))  # type: ignore[misc]
+        for begin, x, y in plan:
+            self.at(begin, lambda x=x, y=y: self._pull(x, y))  # type: ignore[misc]
+        if plan:
+            self._grip = QtCore.QTimer(self.window, interval=500)
+            self._grip.timeout.connect(lambda: self._pull(*self._pulled) if self._pulled else None)
+            self._grip.start()
 
-    def _pull(self, first: bool, x: float, y: float) -> None:
-        stick = self.item("stick")
+    def _pull(self, x: float, y: float) -> None:
+        """Pull the stick; press it again if a busy machine has halted it."""
+        self._pulled = (x, y)
+        stick, mouse = self.item("stick"), _TEST.QTest
         middle, reach = stick.width() / 2, stick.width() * 0.31
-        if first:
-            self._press(stick.mapToScene(QtCore.QPointF(middle, middle)).toPoint())
+        left, none = QtCore.Qt.MouseButton.LeftButton, QtCore.Qt.KeyboardModifier.NoModifier
+        if not stick.property("active"):
+            center = stick.mapToScene(QtCore.QPointF(middle, middle)).toPoint()
+            mouse.mouseRelease(self.window, left, none, center)
+            mouse.mousePress(self.window, left, none, center)
         point = stick.mapToScene(QtCore.QPointF(middle + x * reach, middle + y * reach))
-        _TEST.QTest.mouseMove(self.window, point.toPoint())
-
-    def _press(self, point: QtCore.QPoint) -> None:
-        button = QtCore.Qt.MouseButton.LeftButton
-        none = QtCore.Qt.KeyboardModifier.NoModifier
-        _TEST.QTest.mousePress(self.window, button, none, point)
+        mouse.mouseMove(self.window, point.toPoint())
 
     def screenshot(self, path: Path) -> None:
         """Save a screenshot of the window.
@@ -139,6 +145,7 @@ class Cockpit:
 
     def _let_go(self) -> None:
         """Halt the robot, and wait until the zeros were sent."""
+        self._pulled = None
         self.item("drive").halt()
         loop = QtCore.QEventLoop()
         QtCore.QTimer.singleShot(200, loop.quit)
