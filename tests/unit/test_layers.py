@@ -41,8 +41,9 @@ RANK = {
     # RViz's view and rosglass's own: neither knows the other.
     "rviz": 12,
     "scene": 12,
-    "cli": 14,
-    "demo": 13,
+    "cockpit": 13,
+    "cli": 15,
+    "demo": 14,
 }
 #: The folders of a large package, from the lowest; each imports itself and those before it.
 ROOMS = {

@@ -152,7 +152,7 @@ class Watcher(QtCore.QObject):
 
 _MODULE = re.compile(r'module "([\w.]+)"(?: version ([\d.]+))?')
 _UNVERSIONED = re.compile(r"\s*import\s+[\w.]+\s*(?:as\b|;|//|$)")
-_OURS = {"Ros", "Ros2", "RosControls"}
+_OURS = {"Ros", "Ros2", "RosControls", "RosCockpit"}
 _TYPE = re.compile(r"^(\w+) is not a type$")
 #: Types that only one of our modules has -> the module, and the type's name in the other one.
 _ONLY_IN = {
@@ -263,7 +263,11 @@ def _advice(text: str) -> str:
 
 
 #: Module -> the package above this one that registers its types, once a file imports it.
-_REGISTERED_BY = {"RosControls": "rosglass.controls.modules"}
+_REGISTERED_BY = {
+    "RosControls": "rosglass.controls.modules",
+    # Its QML files use those controls.
+    "RosCockpit": "rosglass.controls.modules",
+}
 if QT6:
     _REGISTERED_BY["RosScene"] = "rosglass.scene.app.modules"
 #: The QML file of a closable item that is only as large as its text.

@@ -124,6 +124,7 @@ def import_folder(place: str | os.PathLike[str]) -> Path:
 IMPORT_PATHS = (
     *(Path(__file__).parents[1] / name for name in ("imports", "imports6" if QT6 else "imports5")),
     Path(__file__).parents[2] / "controls/imports",
+    Path(__file__).parents[2] / "cockpit/imports",
 )
 
 
