@@ -16,9 +16,11 @@ LiveFrame {
     property var goal: undefined
     // Goals to choose from, each a {text, goal} with a button of its own, instead of `goal` or a form.
     property var goals: []
+    // Text of the button that sends.
     property string sendText: qsTr("Send")
     // Whether a goal is sent only after the button has been held down, for `holdTime` seconds.
     property bool hold: false
+    // Seconds for which the button is held down.
     property real holdTime: 1
     // Milliseconds for a server to accept a goal.
     property int timeout: 10000

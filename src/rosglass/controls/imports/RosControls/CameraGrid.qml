@@ -12,6 +12,7 @@ FocusScope {
     // Base topics of the cameras; empty for all that there are.
     property var topics: []
     property string ns
+    // Name of the image transport, such as "raw", "compressed" or "ffmpeg".
     property string transport: "compressed"
     // Columns; 0 for as many as suit the shape.
     property int columns: 0
@@ -21,6 +22,7 @@ FocusScope {
     property real maxRate: 10
     // Index of the big one; -1 for none.
     property int big: -1
+    // "fit", "crop" or "stretch".
     property string fillMode: "fit"
 
     // The cameras that are shown.

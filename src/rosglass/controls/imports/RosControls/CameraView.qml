@@ -13,7 +13,9 @@ FocusScope {
     // The camera's base topic, or that of a transport; without one, the first camera.
     property string topic
     property string ns
+    // Name of the image transport, such as "raw", "compressed" or "ffmpeg".
     property alias transport: camera.defaultTransport
+    // Text of the title.
     property string title: topic_
     // Whether it is received.
     property bool active: visible
@@ -31,6 +33,7 @@ FocusScope {
     property int turn: 0
     // Images per second at most; 0 for all.
     property alias maxRate: camera.throttleRate
+    // Whether images are decoded in full, not in the size in which they are shown.
     property alias fullResolution: camera.fullResolution
     // Whether it has buttons, for snapshot, fill mode and rotation.
     property bool tools: true
@@ -49,10 +52,12 @@ FocusScope {
     // The direction in radians, left and downwards positive; set it to where the camera is.
     property real pan: 0
     property real tilt: 0
+    // Greatest angles to each side, in radians.
     property real maxPan: Math.PI
     property real maxTilt: Math.PI / 2
-    // Radians across the image, for dragging; radians per second, for Twist.
+    // Radians across the image, for dragging.
     property real fieldOfView: 1
+    // Greatest speed in radians per second, for Twist.
     property real maxTurnRate: 0.5
 
     readonly property bool live: fresh_ && !camera.stale && !late && !frozen

@@ -9,6 +9,7 @@ Item {
 
     // What it steers; without one, a TwistCommand of its own on `topic`.
     property var command: own_
+    // Topic of its own TwistCommand.
     property string topic: "cmd_vel"
     property string ns
     // Whether left and right move to the sides, for robots that can, instead of turning.

@@ -31,8 +31,9 @@ Item {
     property string serviceType
     // Milliseconds after which a state that the robot repeats is out of date.
     property int timeout: 1000
-    // Keys that stop, wherever the focus is (except in a text field); and whether Enter, held, releases.
+    // Keys that stop, wherever the focus is (except in a text field).
     property var stopKeys: ["Space"]
+    // Whether Enter releases, when it is held down.
     property bool releaseByEnter: true
 
     // True: wants the robot stopped; false: wants it released; null: content with what it is.

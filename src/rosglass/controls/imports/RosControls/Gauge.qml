@@ -11,9 +11,11 @@ LiveFrame {
     // The range that is drawn, in the unit shown.
     property real from: 0
     property real to: 1
+    // Unit of the number that is shown.
     property string unit
     // What the number is multiplied by: 100 for a share in percent.
     property real factor: 1
+    // Digits behind the point.
     property int decimals: 1
     // Values from which on, upwards or downwards, it is shown as a warning or as bad; NaN for none.
     property real warnAbove: NaN

@@ -18,6 +18,7 @@ LiveFrame {
     property real heading: NaN
     // Whether the robot stays in the middle.
     property bool follow: true
+    // Whether the robot's track is drawn.
     property bool track: true
     // Whether the buttons are shown.
     property bool tools: true

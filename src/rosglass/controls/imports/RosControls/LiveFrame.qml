@@ -5,6 +5,7 @@ import QtQuick 2.15
 Item {
     id: frame
 
+    // Text of the title.
     property string title
     // What it shows: a LiveTopic, Subscription, TfTransform ..., or anything with `stale` and `age`.
     property var source: null

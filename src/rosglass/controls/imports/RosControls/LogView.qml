@@ -8,7 +8,7 @@ LiveFrame {
     // The topic; without one, the first of these types.
     property string topic
     property string ns
-    // Least level that is shown: 0 debug, 1 info, 2 warn, 3 error, 4 fatal.
+    // Least level that is shown, 0 to 4: 0 debug, 1 info, 2 warn, 3 error, 4 fatal.
     property alias minLevel: live.minLevel
     // Shows only nodes, and only texts, that have it; empty for all.
     property alias nodeFilter: live.nodeFilter

@@ -15,16 +15,19 @@ LiveFrame {
     property var paths: ["*"]
     property var footprints: ["*"]
     property var particles: ["*"]
-    // The fixed frame; without one, that of the map. And the robot's.
+    // The fixed frame; without one, that of the map.
     property string frame
+    // The robot's frame.
     property string robotFrame: "base_link"
     // Namespace of the topics tf and tf_static, where they are not global.
     property string tfNs
     // Colours of the map: "theme", "map" as in RViz, "costmap", "raw".
     property string colors: "theme"
-    // Whether the robot stays in the middle, and is seen heading up.
+    // Whether the robot stays in the middle.
     property bool follow: false
+    // Whether the robot is seen heading up.
     property bool headingUp: false
+    // Whether the robot's track is drawn.
     property bool track: true
     // Whether the buttons are shown; without them it is an image that can be moved.
     property bool tools: true

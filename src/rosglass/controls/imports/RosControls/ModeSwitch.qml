@@ -8,8 +8,9 @@ import "fields.js" as Fields
 LiveFrame {
     id: modeSwitch
 
-    // Where a mode is requested, and where the robot says which one it is in.
+    // Topic on which a mode is requested.
     property string topic: "mode"
+    // Topic on which the robot says which mode it is in.
     property string stateTopic: topic + "/state"
     property string ns
     // Services (std_srvs/Trigger) that request the modes, with %1 for the mode, instead of `topic`.

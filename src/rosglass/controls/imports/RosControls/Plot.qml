@@ -5,13 +5,16 @@ import RosControls 1.0
 LiveFrame {
     id: plot
 
-    // Declared series; more can be given as paths, e.g. "/odom:twist.twist.linear.x".
+    // Declared series; more can be given as paths.
     default property list<PlotSeries> series
+    // Topics and fields that are plotted, such as "/odom:twist.twist.linear.x".
     property var paths: []
     property string ns
-    // Seconds that are visible, and that samples are kept; 0 for no limit.
+    // Seconds that are visible.
     property alias window: plotted.window
+    // Seconds for which samples are kept; 0 for no limit.
     property alias history: plotted.history
+    // Whether it stands still; samples are kept all the same.
     property alias paused: plotted.paused
     // Whether times are those of the headers; otherwise, of reception.
     property alias stamps: plotted.stamps
@@ -24,6 +27,7 @@ LiveFrame {
     property alias leftMax: plotted.leftMax
     property alias rightMin: plotted.rightMin
     property alias rightMax: plotted.rightMax
+    // Whether the axis is logarithmic.
     property alias leftLog: plotted.leftLog
     property alias rightLog: plotted.rightLog
     // Where the buttons CSV and PNG write; without a folder, there are none.

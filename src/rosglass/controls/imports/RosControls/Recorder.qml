@@ -17,8 +17,9 @@ LiveFrame {
     property alias fileName: recorder.fileName
     // "mcap", or "bag" for ROS 1 bags.
     property alias format: recorder.format
-    // Bytes and seconds after which a recording ends; 0 for no limit.
+    // Bytes after which a recording ends; 0 for no limit.
     property alias sizeLimit: recorder.sizeLimit
+    // Seconds after which a recording ends; 0 for no limit.
     property alias timeLimit: recorder.timeLimit
     // Bytes that are free on the disk, below which that is shown as a warning.
     property real lowSpace: 1e9

@@ -14,14 +14,17 @@ Item {
     property string type
     // The request's fields; those left out have their defaults.
     property var request: ({})
+    // Text of the button.
     property string text: service
     // Whether it is called only after the button has been held down, for `holdTime` seconds.
     property bool hold: false
+    // Seconds for which the button is held down.
     property real holdTime: 1
     // Milliseconds to wait for the answer; a call from code waits as long for a server.
     property int timeout: 10000
     // Whether `status` is shown below the button; several buttons may have one line in common.
     property bool showStatus: true
+    // Colour of the button.
     property color tint: hold ? Theme.warn : Theme.accent
     // Returns why the server refused, by its response; empty if it did not.
     property var refusalOf: null
