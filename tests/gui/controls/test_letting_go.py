@@ -100,7 +100,7 @@ def test_letting_go_during_an_outage(outage_s: float, screen: str, tmp_path: Pat
             nothing_happens(outage_s)
             robot.received.clear()
             relay.resume()
-            eventually(lambda: robot.zeros >= 3)
+            eventually(lambda: robot.zeros >= 3, lambda: (robot.received, program.text))
             nothing_happens(1.5)
             assert robot.zeros >= 3
             moving = sum(speed > 0 for _, speed in robot.received)

@@ -153,3 +153,19 @@ def test_closing_sends_what_waits(rig):
     rig.window.close()
     rig.window.close()
     assert rig.sent == ["drive", "stop"]
+
+
+def test_outage_is_noticed_in_a_second_however_long_answers_took(rig):
+    """The last zeros of a stop are repeated for a second only."""
+    rig.answered = False
+    rig.send("a")
+    for _ in range(9):
+        rig.send("b", after=0.1)
+    rig.answered = True
+    rig.pass_time(0.01)
+    rig.send("c")
+    rig.answered = False
+    lost = rig.window.lost
+    for _ in range(10):
+        rig.send("d", after=0.1)
+    assert rig.window.lost > lost

@@ -163,7 +163,7 @@ class CommandSender(Handle):
     def end_zeros(self) -> None:
         """Send no more than the first zeros: another sender steers the robot now."""
         with self._changed:
-            self._phase_at = -math.inf
+            self._halted_at = -math.inf
             if not self._held and self._zeros >= _ZEROS:
                 self._zero_at = None
             self._changed.notify()
@@ -218,7 +218,7 @@ class CommandSender(Handle):
         gap = _SHORTEST_S if self._is_new else _RAMP_PERIOD_S if ramps else _PERIOD_S
         return self._sent_at + gap
 
-    def _advance(self, now: float, arrives: bool) -> Velocity:
+    def _advance(self, now: float) -> Velocity:
         """Return the velocity to send now, and set what follows it."""
         if self._held:
             # After a pause, a ramp goes on where it was.
@@ -232,8 +232,6 @@ class CommandSender(Handle):
             )
             self._sent_at, self._is_new = now, False
             return self.velocity
-        if not arrives:
-            self._phase_at = now
         self._zeros += 1
         over = now - self._phase_at >= _ZERO_PHASE_S or now - self._halted_at >= _LONGEST_OUTAGE_S
         if self._zeros < _ZEROS:
@@ -249,6 +247,8 @@ class CommandSender(Handle):
             arrives = self._zero_at is None or self._arrives()
             with self._changed:
                 now = self._clock()
+                if not arrives:  # a zero was dropped, perhaps long before the next one is due
+                    self._phase_at = now
                 if self._held:
                     self._halt_if_stale(now)
                 due = self._due()
@@ -259,7 +259,7 @@ class CommandSender(Handle):
                         due = min(due or 0.0, self._fresh_at + FRESH_S)
                     self._changed.wait(None if due is None else max(0.0, due - now))
                     continue
-                velocity = self._advance(now, arrives)
+                velocity = self._advance(now)
             self._send(velocity)
             with self._changed:
                 reason, self._unreported = self._unreported, ""

@@ -17,8 +17,10 @@ __all__ = ["CommandWindow"]
 
 #: Seconds between polls for the router's answer, while a message waits for it.
 _POLL_S = 0.01
-#: Shortest time in seconds without an answer after which messages are held.
-_MIN_STALL_S = 0.1
+#: Shortest and longest time in seconds without an answer after which messages are held. The last
+#: zeros of a stop are repeated for a second without one that was dropped, so that an outage that
+#: begins with them has to be noticed within that.
+_MIN_STALL_S, _MAX_STALL_S = 0.1, 0.8
 #: Longest answer in seconds that counts as a round trip, not as an outage.
 _MAX_ROUND_TRIP_S = 1.0
 #: Seconds after which a query is given up, and the next message is sent all the same: an answer
@@ -34,7 +36,8 @@ class CommandWindow:
     A message that was handed to Zenoh cannot be recalled: it lies in Zenoh's queue, in the system's
     buffers or in those of a relay, and is delivered after an outage, however old it is by then. So
     a query without result follows the messages. When it has not been answered within twice the
-    usual time, only the newest message is kept, and sent when the answer comes, or dropped.
+    usual time, or 0.8 s, only the newest message is kept, and sent when the answer comes, or
+    dropped.
 
     The limit follows the round trip, as the answers may queue behind camera images for a second: a
     stop must not wait for them. They confirm the way to the router, not that from there to the
@@ -140,7 +143,7 @@ class CommandWindow:
             over = True
         if not over:
             self._waited = waited
-            return waited <= max(_MIN_STALL_S, 2 * self._round_trip)
+            return waited <= min(max(_MIN_STALL_S, 2 * self._round_trip), _MAX_STALL_S)
         self._answer = None
         if self._waited <= _MAX_ROUND_TRIP_S:
             self._round_trip = max(self._waited, 0.9 * self._round_trip)
