@@ -54,6 +54,11 @@ DRIVE = """Item {
 }"""
 
 
+@pytest.fixture(autouse=True)
+def counts_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rosglass.controls.steering.gamepad._SETTLE_S", 0.0)
+
+
 @pytest.fixture
 def plug(wait: Any) -> Iterator[Callable[..., VirtualPad]]:
     """Plugs gamepads in, and out at the end."""
@@ -184,6 +189,27 @@ def test_a_gamepad_unplugged_in_a_turn_halts(
     wait(lambda: twists[-1] == (0.5, 0.0))
 
 
+def test_what_a_gamepad_reports_late_does_not_steer(
+    controls: Any, wait: Any, plug: Any, twists: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its plug was loose for a moment: its button is held, but its report is still to come."""
+    monkeypatch.setattr("rosglass.controls.steering.gamepad._SETTLE_S", 60.0)
+    pad = plug()
+    _, element = show_drive(controls, wait)
+    pad.button(LEFT_SHOULDER)
+    pad.axis(LEFT_Y, -1.0)
+    wait(lambda: element.property("refusal") == "let go first")
+    assert [one for one in twists if any(one)] == []
+    pad.button(LEFT_SHOULDER, False)
+    wait(lambda: element.property("refusal") == "")
+    monkeypatch.setattr("rosglass.controls.steering.gamepad._SETTLE_S", 0.0)
+    pad.axis(LEFT_Y, -0.5)
+    wait(lambda: axis(element, LEFT_Y) < 0.6)
+    pad.axis(LEFT_Y, -1.0)
+    pad.button(LEFT_SHOULDER)
+    wait(lambda: twists and twists[-1][0] == 0.5)
+
+
 def test_only_the_window_in_front_counts(controls: Any, wait: Any, plug: Any, twists: Any) -> None:
     pad = plug()
     root, element = show_drive(controls, wait)
@@ -202,7 +228,7 @@ def test_only_the_window_in_front_counts(controls: Any, wait: Any, plug: Any, tw
     del twists[:]
     other.destroy()
     in_front(controls, wait)
-    wait(lambda: element.property("refusal") == "")
+    wait(lambda: element.property("refusal") == "let go first")
     pad.axis(LEFT_Y, -0.9)
     wait(lambda: 0.8 < axis(element, LEFT_Y) < 0.95)
     assert [one for one in twists if one != (0.0, 0.0)] == [], "the button was never let go"

@@ -36,6 +36,8 @@ _log = logging.getLogger("rosglass.gamepad")
 _JOY, _FEEDBACK = "sensor_msgs/msg/Joy", "sensor_msgs/msg/JoyFeedbackArray"
 #: Seconds after which a state of the gamepad is too old to steer with.
 _FRESH_S = 0.15
+#: Seconds after its connection in which a gamepad may not have reported yet what is held.
+_SETTLE_S = 0.5
 #: Milliseconds between two updates of what is shown of it.
 _SHOW_MS = 33
 #: Messages with everything let go that end what was published.
@@ -211,6 +213,8 @@ class Gamepad(Element):
         #: Whether a hand was off the gamepad since it was connected, or its window came to front.
         self._is_armed = False
         self._is_steering = False
+        #: When the gamepad in use was found, by :func:`time.monotonic`.
+        self._found_at = 0.0
         #: The state that was published last; and messages to send before falling silent.
         self._published: Pad | None = None
         self._neutral_left = 0
@@ -397,16 +401,18 @@ class Gamepad(Element):
         chosen, before = self._choose(), self._pad
         if before is not None and (chosen is None or chosen.id != before.id):
             self._lose(before)
+        if chosen is not None and (before is None or chosen.id != before.id):
+            self._found_at = self._snapshot.at
         pad = self._pad = chosen
         self._motors.pad_id = -1 if pad is None else pad.id
         self._set_device_problems(self._snapshot.problem, "" if pad is None else self._missing(pad))
         is_fresh = time.monotonic() - self._snapshot.at < _FRESH_S
-        obstacle = self._window_obstacle() if pad is not None else "no gamepad"
+        obstacle = refusal = self._window_obstacle() if pad is not None else "no gamepad"
         if obstacle or pad is None:
             self._let_go()
             self._is_armed = False
         elif is_alive(self._command) and is_fresh:
-            self._steer(pad)
+            refusal = self._steer(pad)
         if is_alive(self):
             self._publish_change(None if obstacle else pad)
             report(
@@ -414,16 +420,17 @@ class Gamepad(Element):
                 connected=pad is not None,
                 name="" if pad is None else pad.name,
                 held=self._is_steering,
-                refusal=obstacle,
+                refusal=refusal,
             )
 
-    def _steer(self, pad: Pad) -> None:
+    def _steer(self, pad: Pad) -> str:
+        """Steer or let go; return why what is held does not count, empty if it does."""
         share = self.turboSpeed if self._is_down(pad, self.turbo) else self.speed
         names = (self.forward, self.left, self.sideways)
         wanted = [share * self._axis(pad, name) for name in names]
         is_held = self._is_down(pad, self.deadMan) if self.deadMan else any(wanted)
         if not is_held:
-            self._is_armed = True
+            self._is_armed |= self._snapshot.at - self._found_at >= _SETTLE_S
             self._let_go()
         elif self._is_armed:
             command = self._command
@@ -432,6 +439,9 @@ class Gamepad(Element):
                 # If QML destroys this object.
                 self._cleanup["steering"] = lambda: command.halt() if is_alive(command) else None
             command.steer(self, *wanted[: 3 if self.sideways else 2])
+        else:
+            return "let go first"
+        return ""
 
     def _let_go(self) -> None:
         if self._is_steering:
