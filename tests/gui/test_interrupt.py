@@ -116,6 +116,23 @@ def test_handlers_are_kept_that_are_the_programs_own() -> None:
     assert received == [signal.SIGTERM]
 
 
+@pytest.mark.usefixtures("before")
+def test_a_lost_terminal_ends_the_program_unless_that_is_ignored() -> None:
+    """As under nohup."""
+    received: list[int] = []
+    found = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with QuitOnSignal(received.append, 60):
+            os.kill(os.getpid(), signal.SIGHUP)
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
+        assert not received
+        with QuitOnSignal(received.append, 60):
+            os.kill(os.getpid(), signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, found)
+    assert received == [signal.SIGHUP]
+
+
 def test_signals_of_others_reach_whom_python_wakes() -> None:
     """As asyncio, which has taken the wakeup file before."""
     reader, writer = socket.socketpair()

@@ -74,7 +74,7 @@ def test_a_missing_file(start: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.both_qt
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signals_end_it(start: Any, file: Path, number: int) -> None:
     file.write_text(GOOD)
     program = start("run", file)

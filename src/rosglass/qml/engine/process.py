@@ -167,6 +167,10 @@ _DEFAULTS: dict[int, Any] = {
     signal.SIGINT: signal.default_int_handler,
     signal.SIGTERM: signal.SIG_DFL,
 }
+#: Sent when the terminal is closed or its connection is lost; ignored under nohup.
+_HANGUP: int | None = getattr(signal, "SIGHUP", None)
+if _HANGUP is not None:
+    _DEFAULTS[_HANGUP] = signal.SIG_DFL
 
 
 def end_process_within(seconds: float, code: int) -> None:
@@ -215,7 +219,9 @@ class QuitOnSignal:
         keep_handlers: bool = False,
     ) -> None:
         self._quit, self._timeout_s = quit, timeout_s
-        self._signals = [n for n in _DEFAULTS if not (keep_handlers and _is_programs_own(n))]
+        self._signals = [
+            n for n in _DEFAULTS if not ((keep_handlers or n == _HANGUP) and _is_programs_own(n))
+        ]
         self._reader, self._writer = os.pipe()
         self._ended = threading.Event()
         self._before: dict[int, Any] = {}
