@@ -1,13 +1,15 @@
 """Measures how soon a robot is halted, for each way to let go of it.
 
-    python benchmarks/letting_go.py [--times N] [--only WAY ...] [--ros1] [--busy]
+    scripts/private_network.sh python benchmarks/letting_go.py [--times N] [--only WAY ...]
+        [--wire zenoh|dds|ros1] [--busy]
 
 A screen with a DriveStick, DriveKeys and an input made of code runs in a process of its own, in a
 real window on Xvfb; mouse and keys come from xdotool. The robot is a subscriber in this process,
-over Zenoh with a router, or over ROS 1. For each way: how long after the event the robot received
-the last motion (negative: the last one was sent before it; while held, they are at most 50 ms
-apart), the zeros that followed, and motions after the first zero. The event is timed before it is
-requested, so xdotool's own start counts. With --busy, both cores are kept busy by other processes.
+over Zenoh with a router, over DDS, or over ROS 1. For each way: how long after the event the robot
+received the last motion (negative: the last one was sent before it; while held, they are at most
+50 ms apart), the zeros that followed, and motions after the first zero. The event is timed before
+it is requested, so xdotool's own start counts. With --busy, both cores are kept busy by other
+processes.
 Exits 1 when a limit is missed: 50 ms, 200 ms for a frozen screen; three zeros; no motion after.
 """
 
@@ -41,6 +43,11 @@ def router() -> Iterator[str]:
 
 
 @contextlib.contextmanager
+def domain() -> Iterator[str]:
+    yield "dds://127.0.0.1?domain=77"
+
+
+@contextlib.contextmanager
 def master() -> Iterator[str]:
     port = free_port()
     with tempfile.TemporaryDirectory() as home:
@@ -53,6 +60,9 @@ def master() -> Iterator[str]:
         finally:
             made.kill()
             made.wait()
+
+
+WIRES = {"zenoh": router, "dds": domain, "ros1": master}
 
 
 def measure(names: list[str], times: int, url: str, display: str) -> dict[str, list[Outcome]]:
@@ -95,11 +105,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--times", type=int, default=20)
     parser.add_argument("--only", nargs="*", choices=list(WAYS), default=list(WAYS))
-    parser.add_argument("--ros1", action="store_true")
+    parser.add_argument("--wire", choices=list(WIRES), default="zenoh")
     parser.add_argument("--busy", action="store_true")
     given = parser.parse_args()
-    with VirtualScreen() as screen, master() if given.ros1 else router() as url:
-        print(f"{given.times} times each, over {url.partition(':')[0]}; ms after the event\n")
+    with VirtualScreen() as screen, WIRES[given.wire]() as url:
+        print(f"{given.times} times each, over {given.wire}; ms after the event\n")
         print("| way | median | worst | limit | least zeros | motions after | |")
         print("|---|---|---|---|---|---|---|")
         with stays_connected(screen.display), busy_cores(given.busy):

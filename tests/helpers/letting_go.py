@@ -24,10 +24,14 @@ if TYPE_CHECKING:
 
 #: Size of the window, which is at the upper left of the screen; and the stick in it.
 _SIZE, _STICK = (600, 400), (100, 100)
+#: The stick in a second window.
+_SECOND_STICK = (750, 300)
 #: X11's code of the key Up in the keypad, which is the 8 with Num Lock.
 _KEYPAD_UP = 80
 #: Seconds without a message after which nothing is sent any more: zeros are up to 0.1 s apart.
 _SILENCE_S = 0.5
+#: Controls of a virtual gamepad, as in virtual_pads.py, which needs SDL.
+LEFT_SHOULDER, LEFT_Y = 9, 1
 SCREEN = """import QtQuick 2.15
 import QtQuick.Window 2.15
 import QtQuick.Templates 2.15 as T
@@ -85,6 +89,16 @@ Window {
         }
     }
     T.Popup { id: popup; objectName: "popup"; modal: true; x: 250; width: 50; height: 50 }
+    Loader { objectName: "pads"; active: false; sourceComponent: Gamepad { command: drive } }
+    Loader {
+        objectName: "panels"
+        active: false
+        sourceComponent: Window {
+            objectName: "panel"
+            x: 650; y: 200; width: 200; height: 200; visible: true; title: "panel"
+            DriveStick { width: 200; height: 200; command: drive }
+        }
+    }
     Window { objectName: "other"; x: 620; width: 100; height: 100; title: "other" }
     Window {
         objectName: "dialog"
@@ -280,6 +294,21 @@ def touch(screen: Screen) -> None:
     screen.ask("touch('move', 100, 40)")
 
 
+def drag_in_panel(screen: Screen) -> None:
+    """Pull the stick in a second window ahead."""
+    screen.ask("set('panels', 'active', True); panel().requestActivate()")
+    nothing_happens(0.2)
+    x, y = _SECOND_STICK
+    screen.x11("mousemove", x, y, "; mousedown 1; mousemove", x, y - 60)
+
+
+def pull_pad(screen: Screen) -> None:
+    """Plug a gamepad in, press its dead-man button, and push its stick ahead."""
+    screen.ask("plug()")
+    nothing_happens(1.0)  # until it counts
+    screen.ask("pull()")
+
+
 class Way(NamedTuple):
     """A way to let go.
 
@@ -391,6 +420,13 @@ WAYS: dict[str, Way] = {
     "JavaScript interrupted": Way(press, _asks("set('window', 'work', 5)"), limit_s=0.2),
     "SIGINT": Way(press, _sends(signal.SIGINT), ends=True),
     "SIGTERM": Way(drag, _sends(signal.SIGTERM), ends=True),
+    "second window closed": Way(drag_in_panel, _asks("panel().close()")),
+    "second window destroyed": Way(drag_in_panel, _asks("set('panels', 'active', False)")),
+    "topic changed": Way(drag, _asks("set('command', 'topic', 'other_vel')")),
+    "gamepad released": Way(pull_pad, _asks("pads[0].button(LEFT_SHOULDER, False)")),
+    "gamepad unplugged": Way(pull_pad, _asks("pads.pop().unplug()")),
+    "gamepad plugged again": Way(pull_pad, _asks("plug_again()")),
+    "SIGHUP": Way(drag, _sends(signal.SIGHUP), ends=True),
     "Qt.quit()": Way(press, _asks("quit()"), ends=True),
 }
 
@@ -425,7 +461,7 @@ def let_go(screen: Screen, robot: Robot, way: Way) -> Outcome:
     eventually(moves, lambda: screen.text)
     before = len(robot.received)
     began = way.let_go(screen)
-    eventually(lambda: robot.zeros >= 3, lambda: (screen.text, robot.received[before:]))
+    eventually(lambda: robot.zeros >= 3, lambda: (screen.text, robot.received[before:][-40:]))
     eventually(lambda: time.monotonic() - robot.received[-1][0] > _SILENCE_S)
     later = robot.received[before:]
     first = next(at for at, (_, speed) in enumerate(later) if not speed)
@@ -495,6 +531,33 @@ def main(file: str, url: str) -> int:
         (sequence.press if what == "press" else sequence.move)(1, QtCore.QPoint(x, y), window)
         sequence.commit()
 
+    pads: list[Any] = []
+
+    def plug() -> None:
+        """Plug a gamepad in."""
+        import sdl2
+        from virtual_pads import VirtualPad
+
+        from rosglass.controls.steering.gamepad_devices import devices
+
+        if not sdl2.SDL_WasInit(sdl2.SDL_INIT_JOYSTICK):
+            devices.listen(lambda _: None)
+            set_property("pads", "active", True)
+            eventually(lambda: sdl2.SDL_WasInit(sdl2.SDL_INIT_JOYSTICK))
+        pads.append(VirtualPad())
+
+    def pull() -> None:
+        """Steer by it."""
+        pads[0].axis(LEFT_Y, -1)
+        pads[0].button(LEFT_SHOULDER)
+
+    def plug_again() -> None:
+        """Pull its plug and push it in again; it reports later that its button is held."""
+        pads.pop().unplug()
+        time.sleep(0.01)
+        plug()
+        QtCore.QTimer.singleShot(250, pull)
+
     def reset() -> None:
         for name, properties in {
             "window": {"pushed": False, "wrong": False, "work": 0, "visible": True},
@@ -503,16 +566,25 @@ def main(file: str, url: str) -> int:
             "other": {"visible": False},
             "dialog": {"visible": False},
             "loader": {"active": True},
-            "command": {"ns": ""},
+            "panels": {"active": False},
+            "command": {"ns": "", "topic": "cmd_vel"},
         }.items():
             for key, value in properties.items():
                 set_property(name, key, value)
         command_sender.time = time
+        while pads:
+            pads.pop().unplug()
         item("window").showNormal()
         item("window").requestActivate()
         timer.start(20)
 
     names = {
+        "panel": lambda: item("panels").property("item"),
+        "pads": pads,
+        "plug": plug,
+        "plug_again": plug_again,
+        "pull": pull,
+        "LEFT_SHOULDER": LEFT_SHOULDER,
         "reset": reset,
         "item": item,
         "set": set_property,

@@ -189,7 +189,7 @@ def test_a_gamepad_unplugged_in_a_turn_halts(
     wait(lambda: twists[-1] == (0.5, 0.0))
 
 
-def test_what_a_gamepad_reports_late_does_not_steer(
+def test_button_that_is_reported_late_does_not_steer(
     controls: Any, wait: Any, plug: Any, twists: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its plug was loose for a moment: its button is held, but its report is still to come."""
