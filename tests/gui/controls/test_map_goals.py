@@ -188,6 +188,10 @@ def test_goal_is_driven_to_and_cancelled(
     nav2.cancels = False
     goals.cancel()
     wait(lambda: "not cancelled: " in message(live_controls))
+    before = goals.property("distance")
+    nav2.feedback = {"distance_remaining": 3.25}
+    wait(lambda: goals.property("distance") != before)
+    assert "not cancelled: " in message(live_controls), "to be read, although it drives on"
     assert goals.property("active") == "goal", "it goes on"
     nav2.cancels = True
     goals.cancel()

@@ -35,6 +35,8 @@ QtObject {
     property int number_: 0
     property bool accepted_: false
     property string action_: ""
+    // While it runs, feedback does not replace the reason of a refusal.
+    property Timer reading_: Timer { interval: 5000 }
 
     function pose_(pose) {
         return { position: { x: pose.x, y: pose.y, z: 0 },
@@ -135,6 +137,7 @@ QtObject {
         reached = 0
         poses = list
         active = what
+        reading_.stop()
         try {
             handle_ = client.sendGoalAsync(goal, {
                 onGoalResponse: function(handle) {
@@ -157,6 +160,7 @@ QtObject {
                 if (isCurrent()) {
                     goals.cancelling = false
                     goals.refuse_(qsTr("not cancelled: %1").arg(reason))
+                    goals.reading_.restart()
                 }
             })
         } catch (error) {
@@ -178,7 +182,7 @@ QtObject {
             reached = feedback.current_waypoint
         if (/NavigateThroughPoses/.test(type))
             reached = Math.max(0, poses.length - feedback.number_of_poses_remaining)
-        if (cancelling)
+        if (cancelling || reading_.running)
             return
         const parts = []
         if (active === "waypoints")
