@@ -7,7 +7,7 @@ from typing import Any
 
 def rows(controls: Any, *roles: str) -> list[Any]:
     """Return a role, or several, of all rows of the tree that is shown."""
-    model = controls.find("tree").property("rows")
+    model = controls.find("tree").property("model")
     found = []
     for row in range(model.rowCount()):
         values = [model.value(row, role) for role in roles]

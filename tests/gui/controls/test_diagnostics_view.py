@@ -17,7 +17,7 @@ def shown(controls: Any, wait: Any) -> Any:
         publisher = controls.robot.create_publisher("/diagnostics", DIAGNOSTICS)
         view = controls.show(control)
         wait(publisher.subscription_count)
-        return view, publisher, lambda: rows_of(view.property("reports").property("model"))
+        return view, publisher, lambda: rows_of(view.property("reports").property("rows"))
 
     return show
 
@@ -82,12 +82,12 @@ def test_part_unfolds_by_keyboard(shown: Any, controls: Any, wait: Any) -> None:
         for kind in (QtCore.QEvent.Type.KeyPress, QtCore.QEvent.Type.KeyRelease):
             modifiers = QtCore.Qt.KeyboardModifier.NoModifier
             app.sendEvent(controls.window, QtGui.QKeyEvent(kind, key, modifiers))
-    wait(lambda: rows()[0]["unfolded"])
+    wait(lambda: rows()[0]["open"])
     wait(lambda: listed.property("contentHeight") > before + 20)
     # The next report changes the values, not what is unfolded.
     publisher.publish(status=[part("a", 0, "fine", "cpu0", load="4 %")])
     wait(lambda: rows()[0]["values"] == [{"key": "load", "value": "4 %"}])
-    assert rows()[0]["unfolded"]
+    assert rows()[0]["open"]
 
 
 def test_nothing_is_cut_without_a_count(shown: Any, controls: Any, wait: Any) -> None:
@@ -166,7 +166,7 @@ def test_model_shows_any_change(controls: Any) -> None:
     chance = random.Random(1)
     rows = {key: {"name": key} for key in range(40)}
     owner = QtCore.QObject()
-    model = RowModel(["name"], rows, owner)
+    model = RowModel(owner, ["name"])
     mirror: list[int] = []
 
     def moved(_: Any, first: int, last: int, __: Any, to: int) -> None:
@@ -194,8 +194,9 @@ def test_model_shows_any_change(controls: Any) -> None:
             keys.insert(chance.randrange(len(keys)), keys.pop(chance.randrange(len(keys))))
         else:
             keys = chance.sample(range(40), chance.randrange(41))
-        model.arrange(keys)
+        model.show({key: rows[key] for key in keys})
         assert list(model.keys) == keys == mirror
+        assert list(model.rows) == [rows[key] for key in keys]
 
 
 def test_another_topic_starts_anew(shown: Any, controls: Any, wait: Any) -> None:

@@ -42,7 +42,7 @@ def test_latched_message_is_shown_and_published_back(live_controls: Any, wait: A
     view = live_controls.show('MessageView { topic: "/mode"; editable: true }')
     wait(lambda: rows(live_controls, "value") == ["idle"])
     view.edit_()
-    rows_of = live_controls.find("tree").property("rows").parent()
+    rows_of = live_controls.find("tree").property("model").parent()
     assert rows_of.setValue("data", "drive")
     view.publish_()
     wait(lambda: "drive" in [one.data for one in received])

@@ -45,6 +45,20 @@ def show(controls: Any, wait: Any, more: str = "") -> Any:
     return form
 
 
+def test_text_being_entered_stays_when_a_parameter_appears(
+    controls: Any, robot: Any, wait: Any
+) -> None:
+    form = show(controls, wait)
+    field = controls.find("editor", row(controls, "gains"))
+    field.forceActiveFocus()
+    field.setProperty("text", "[3.0, ")
+    total = form.property("total")
+    robot.parameters.declare("depth", 7)
+    wait(lambda: form.property("total") == total + 1)
+    assert field.property("activeFocus")
+    assert field.property("text") == "[3.0, "
+
+
 def test_form_shows_all_parameters_with_their_editors(controls: Any, robot: Any, wait: Any) -> None:
     show(controls, wait)
     speed = row(controls, "speed")

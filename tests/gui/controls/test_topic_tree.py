@@ -31,7 +31,7 @@ def test_a_topic_that_appears_or_goes_changes_only_its_row(controls: Any, wait: 
     controls.show('TopicTree { ns: "/" }')
     wait(lambda: "/c" in rows(controls, "key"))
     resets: list[None] = []
-    model = controls.find("tree").property("rows")
+    model = controls.find("tree").property("model")
     count = lambda: resets.append(None)  # noqa: E731 - methods change metaobjects
     model.modelReset.connect(count)
     publisher = controls.robot.create_publisher("/b", STRING)

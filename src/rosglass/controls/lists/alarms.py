@@ -41,7 +41,7 @@ class Alarms(QtCore.QObject):
     reports = Writable(QtCore.QObject, read=lambda self: self._reports, write="_set_reports")
     #: From which level on a part raises one: "error" or "warning". A silent part always does.
     level = Writable(str, "error", one_of("error", "warning"), then="_review")
-    model = ReadOnly(QtCore.QObject)
+    rows = ReadOnly(QtCore.QObject, read=lambda self: self._model)
     #: Alarms that are not over, that are not acknowledged, and of both kinds together.
     active = ReadOnly(int, 0)
     unacknowledged = ReadOnly(int, 0)
@@ -58,7 +58,7 @@ class Alarms(QtCore.QObject):
         super().__init__(parent)
         self._reports: DiagnosticsTopic | None = None
         self._rows: dict[Hashable, dict[str, Any]] = {}
-        self._model = RowModel(self.ROLES, self._rows, self)
+        self._model = RowModel(self, self.ROLES)
         #: Whether the alarms that are being added are the first.
         self._first = False
         self._look = lambda: self._review() if is_alive(self) else None
@@ -198,7 +198,8 @@ class Alarms(QtCore.QObject):
             return (row["acknowledged"], not row["first"], not row["active"], -RANK[row["level"]])
 
         # The order of adding decides among equals: the oldest is above.
-        self._model.arrange(sorted(self._rows, key=order))
+        self._model.show({key: self._rows[key] for key in sorted(self._rows, key=order)})
+        self._model.refresh()
         rows = list(self._rows.values())
         if not report(
             self,

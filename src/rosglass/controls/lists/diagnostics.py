@@ -29,7 +29,7 @@ _MAX_VALUES, _MAX_MESSAGE_VALUES = 200, 10_000
 class DiagnosticsTopic(MergedTopic):
     """Merges ``diagnostic_msgs/DiagnosticArray``. See its page in ``docs/controls``."""
 
-    ROLES = ("name", "hardware", "level", "text", "values", "more", "silent", "unfolded")
+    ROLES = ("name", "hardware", "level", "text", "values", "more", "silent", "open")
 
     #: Emitted after each change of the rows.
     merged = Signal()
@@ -70,7 +70,7 @@ class DiagnosticsTopic(MergedTopic):
                 row = rows[key] = {
                     "name": bounded(status.name) or "?",
                     "hardware": bounded(status.hardware_id),
-                    "unfolded": False,
+                    "open": False,
                 }
             level = status.level
             if isinstance(level, bytes):
@@ -89,7 +89,7 @@ class DiagnosticsTopic(MergedTopic):
         if refused:
             report(self, omitted=self._omitted + refused)
 
-    def _order(self, now: float) -> list[Any]:
+    def _order(self, now: float) -> dict[Any, dict[str, Any]]:
         counts, limit = [0, 0, 0, 0], self.silentAfter
         for row in self._rows.values():
             age = now - row["at"]
@@ -105,7 +105,7 @@ class DiagnosticsTopic(MergedTopic):
                 if any(wanted in row[role].casefold() for role in ("name", "hardware", "text"))
             ]
         found.sort(key=lambda one: (-RANK[one[1]["level"]], one[0]))
-        return [key for key, _ in found]
+        return dict(found)
 
     def _report_counts(self, counts: list[int]) -> None:
         oks, warnings, errors, stales = counts
@@ -127,8 +127,7 @@ class DiagnosticsTopic(MergedTopic):
     @Slot(int)
     def toggle(self, at: int) -> None:
         """Unfold or fold the keys and values of a row."""
-        keys = self._model.keys
-        if 0 <= at < len(keys):
-            row = self._rows[keys[at]]
-            row["unfolded"] = not row["unfolded"]
-            self._model.changed(keys[at])
+        if 0 <= at < len(self._model.rows):
+            row = self._model.rows[at]
+            row["open"] = not row["open"]
+            self._model.changed(self._model.keys[at])

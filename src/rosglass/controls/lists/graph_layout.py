@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.names import hidden
 from rosglass.controls.lists.layered_layout import Layout, lay_out
-from rosglass.controls.lists.rows import Rows
+from rosglass.controls.lists.row_model import RowModel
 from rosglass.controls.lists.texts import copy_text, joined
 from rosglass.controls.lists.topic_rows import read_topics
 from rosglass.controls.topics.graph_watch import GraphReader
@@ -89,8 +89,8 @@ class GraphLayout(GraphReader):
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
-        self._model = Rows(self, _ROLES)
-        self._segments = Rows(self, _SEGMENT_ROLES)
+        self._model = RowModel(self, _ROLES)
+        self._segments = RowModel(self, _SEGMENT_ROLES)
         self._drawn = _Drawn({}, {}, lay_out((), ()), 0)
 
     def _reading(self, node: Node) -> Callable[[], _Drawn]:

@@ -166,7 +166,7 @@ class JointTopic(MergedTopic):
         row["nearness"] = min(share, 1 - share)
         row["maxEffort"], row["maxVelocity"] = joint.effort, joint.velocity
 
-    def _order(self, now: float) -> list[Any]:
+    def _order(self, now: float) -> dict[Any, dict[str, Any]]:
         self._look_for_parameter(now)
         limit, silent, beyond, limited = self.silentAfter, 0, 0, 0
         for row in self._rows.values():
@@ -179,7 +179,7 @@ class JointTopic(MergedTopic):
         if now - self._sorted_at > _SORT_S or len(self._order_now) != len(self._rows):
             self._sorted_at = now
             self._order_now = self._sorted()
-        return self._order_now
+        return {name: self._rows[name] for name in self._order_now}
 
     def _sorted(self) -> list[str]:
         rows = self._rows

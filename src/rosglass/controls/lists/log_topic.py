@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import time
 from bisect import bisect_left, bisect_right
-from collections import deque
 from functools import lru_cache
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import Durability, QoS, Reliability
@@ -77,11 +77,8 @@ class LogTopic(MergedTopic):
         self._timeout = 0
         self._next = 0
         self._totals = [0] * len(_NAMES)
-        #: Numbers of the messages that are kept, and of those to be shown that are new.
-        self._numbers: deque[int] = deque()
+        #: Numbers of the messages to be shown that are new.
         self._new: list[int] = []
-        #: Numbers of the rows that a pause keeps.
-        self._held: set[int] = set()
         self._arrived = 0
 
     def _merge(self, message: Message, now: float) -> None:  # noqa: ARG002 - of the base
@@ -110,7 +107,6 @@ class LogTopic(MergedTopic):
         }
         self._totals[at] += 1
         self._arrived += 1
-        self._numbers.append(number)
         if self._fits(row):
             self._new.append(number)
 
@@ -124,26 +120,20 @@ class LogTopic(MergedTopic):
 
     def _arrange(self) -> None:
         self._reviewed, self._dirty = time.monotonic(), False
-        numbers, rows, gone = self._numbers, self._rows, []
-        while len(numbers) > self.keep:
-            gone.append(numbers.popleft())
-        first = numbers[0] if numbers else self._next + 1
-        if self._paused:
-            for number in gone:
-                if number not in self._held:
-                    del rows[number]
-        else:
-            shown = self._model.keys
-            new = [number for number in self._new if number >= first]
-            self._model.slide(bisect_left(shown, first), new)
+        rows = self._rows
+        gone = list(islice(rows, max(0, len(rows) - self.keep)))
+        for number in gone:
+            del rows[number]
+        if not self._paused:
+            first = next(iter(rows), self._next + 1)
+            new = {number: rows[number] for number in self._new if number >= first}
+            self._model.slide(bisect_left(self._model.keys, first), new)
             self._new.clear()
-            for number in gone:
-                rows.pop(number, None)
             self._arrived = 0
         report(
             self,
             counts=list(self._totals),
-            kept=len(numbers),
+            kept=len(rows),
             waiting=self._arrived,
             removed=self._removed + len(gone),
         )
@@ -151,25 +141,18 @@ class LogTopic(MergedTopic):
     def _apply_filters(self) -> None:
         """Show what fits the filters, unless it is paused."""
         if self._paused:
-            self._held = self._held or set(self._model.keys)
             return
-        kept = set(self._numbers)
-        for number in self._held - kept:
-            self._rows.pop(number, None)
-        self._held.clear()
         self._new.clear()
-        self._model.arrange([one for one in self._numbers if self._fits(self._rows[one])])
+        self._model.show({key: row for key, row in self._rows.items() if self._fits(row)})
         self._arrange()
 
     def _forget(self) -> None:
         super()._forget()
-        self._numbers.clear()
         self._new.clear()
-        self._held.clear()
         self._totals = [0] * len(_NAMES)
         self._arrived = 0
         report(self, removed=0)
-        self._model.arrange([])
+        self._model.show({})
 
     @Slot()
     def clear(self) -> None:
@@ -180,20 +163,18 @@ class LogTopic(MergedTopic):
     @Slot(int, result="QVariant")
     def row(self, at: int) -> Any:
         """Return the values of a row by role, or None."""
-        keys = self._model.keys
-        return dict(self._rows[keys[at]]) if 0 <= at < len(keys) else None
+        rows = self._model.rows
+        return dict(rows[at]) if 0 <= at < len(rows) else None
 
     @Slot(int, result=str)
     @Slot(result=str)
     def copy(self, at: int = -1) -> str:
         """Copy a row, or all rows that are shown, to the clipboard; return the text."""
-        keys = self._model.keys
-        wanted = keys if at < 0 else keys[at : at + 1]
-        lines = []
-        for key in wanted:
-            row = self._rows[key]
-            lines.append(f"{row['time']} {_NAMES[row['level']]} [{row['node']}] {row['text']}")
-        text = "\n".join(lines)
+        rows = self._model.rows
+        text = "\n".join(
+            f"{row['time']} {_NAMES[row['level']]} [{row['node']}] {row['text']}"
+            for row in (rows if at < 0 else rows[at : at + 1])
+        )
         if text:
             QtGui.QGuiApplication.clipboard().setText(text)
         return text

@@ -45,7 +45,7 @@ class MergedTopic(LiveTopic):
     ROLES: ClassVar[tuple[str, ...]] = ()
 
     #: The rows, for a ListView.
-    model = ReadOnly(QtCore.QObject)
+    rows = ReadOnly(QtCore.QObject, read=lambda self: self._model)
     #: Messages that were not merged, as more came than could be shown.
     lost = ReadOnly(int, 0)
 
@@ -56,7 +56,7 @@ class MergedTopic(LiveTopic):
     ) -> None:
         super().__init__(parent, runtime)
         self._rows: dict[Any, dict[str, Any]] = {}
-        self._model = RowModel(self.ROLES, self._rows, self)
+        self._model = RowModel(self, self.ROLES)
         #: When the present turn ends.
         self._turn_end = math.inf
         #: Messages that wait for the next turn, with the times when they arrived; and how many had
@@ -74,8 +74,8 @@ class MergedTopic(LiveTopic):
         """Put the content of a message into the rows."""
         raise NotImplementedError
 
-    def _order(self, now: float) -> list[Any]:
-        """Return the keys of the rows to show, in their order, after a look at their age."""
+    def _order(self, now: float) -> dict[Any, dict[str, Any]]:
+        """Return the rows to show, in their order, after a look at their age."""
         raise NotImplementedError
 
     def _forget(self) -> None:
@@ -86,7 +86,8 @@ class MergedTopic(LiveTopic):
     def _arrange(self) -> None:
         """Show the rows as they are now."""
         self._reviewed, self._dirty = time.monotonic(), False
-        self._model.arrange(self._order(self._reviewed))
+        self._model.show(self._order(self._reviewed))
+        self._model.refresh()
 
     def _show(self, sample: Sample, held: float) -> None:
         begin = time.monotonic()

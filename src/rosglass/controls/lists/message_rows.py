@@ -8,7 +8,7 @@ import struct
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.qos import QoS
-from rosglass.controls.lists.rows import Rows
+from rosglass.controls.lists.row_model import RowModel
 from rosglass.controls.lists.texts import bounded, copy_text
 from rosglass.controls.topics.live_topic import LiveTopic
 from rosglass.errors import ConversionError, Error
@@ -106,7 +106,7 @@ class MessageRows(LiveTopic):
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
-        self._model = Rows(self, _ROLES, self._read)
+        self._model = RowModel(self, _ROLES, self._read)
         self._root: TreeItem | None = None
         #: Type of the root.
         self._kind: Any = None
@@ -158,8 +158,7 @@ class MessageRows(LiveTopic):
 
     def _arrays(self) -> list[_Field]:
         """Return the visible arrays."""
-        found = (self._model.at(row) for row in range(self._model.rowCount()))
-        return [field for field in found if field.item.is_array]
+        return [field for field in self._model.rows if field.item.is_array]
 
     def _collect(self, above: _Field, rows: dict[str, _Field]) -> None:
         for item, span in above.below():
@@ -233,7 +232,7 @@ class MessageRows(LiveTopic):
         """Fold or unfold a row."""
         if key not in self._open and len(self._open) >= _MAX_OPEN:
             # Rows that are no longer in the message do not count.
-            self._open &= {self._model.key(row) for row in range(self._model.rowCount())}
+            self._open.intersection_update(self._model.keys)
             if len(self._open) >= _MAX_OPEN:
                 report(self, refusal=f"{_MAX_OPEN} rows are unfolded: fold others first")
                 return
@@ -248,7 +247,7 @@ class MessageRows(LiveTopic):
         """Copy the path of a row, as plots take it; without a number, topic and field path."""
         row = self._model.find(key)
         if row >= 0:
-            copy_text(self._path(self._model.at(row)) or f"{self._resolved}:{key}")
+            copy_text(self._path(self._model.rows[row]) or f"{self._resolved}:{key}")
 
     # -- editing ---------------------------------------------------------------------------------
 
@@ -276,7 +275,7 @@ class MessageRows(LiveTopic):
     def setValue(self, key: str, text: str) -> bool:
         """Set a leaf of the edited message; if the text does not fit, `refusal` says why."""
         row = self._model.find(key)
-        field = self._model.at(row) if row >= 0 else None
+        field = self._model.rows[row] if row >= 0 else None
         if not self._editing or field is None or not field.item.is_leaf:
             return False
         item = field.item

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.parameters import ParameterDescriptor, ParameterType
+from rosglass.controls.lists.row_model import RowModel
 from rosglass.errors import ConversionError, Error
 from rosglass.qml.elements.element import Element
 from rosglass.qml.elements.parameter import ParameterLink, as_type
@@ -26,9 +27,7 @@ if TYPE_CHECKING:
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.qml.engine.session import Session
 
-    _Index = QtCore.QModelIndex | QtCore.QPersistentModelIndex
-
-__all__ = ["NodeParameters", "ParameterRows"]
+__all__ = ["NodeParameters"]
 
 #: Seconds for which a change by another client is marked.
 _MARK_S = 5.0
@@ -62,8 +61,7 @@ class _Row:
         problem: Why a value was refused, or cannot be read.
         first: The value when it was first shown.
         pending: Number of changes without a reply.
-        marked_until: Time until which a change by another client is marked.
-        is_marked: Whether it is marked.
+        is_marked: Whether it is marked as changed by another client.
     """
 
     name: str
@@ -72,7 +70,6 @@ class _Row:
     problem: str = ""
     first: Any = None
     pending: int = 0
-    marked_until: float = -math.inf
     is_marked: bool = False
 
     @property
@@ -139,48 +136,6 @@ _ROLES: dict[str, Callable[[_Row], Any]] = {
     "changed": lambda row: row.value != row.first,
     "external": lambda row: row.is_marked,
 }
-#: Qt.UserRole + 1, as a number: PySide creates all of Qt's enumerations at the first that is used.
-_FIRST_ROLE = 0x0101
-_NUMBERS = {_FIRST_ROLE + at: name for at, name in enumerate(_ROLES)}
-
-
-class ParameterRows(QtCore.QAbstractListModel):
-    """The rows of a :class:`NodeParameters`, for a ListView."""
-
-    def __init__(self, parent: NodeParameters) -> None:
-        super().__init__(parent)
-        self.rows: list[_Row] = []
-        self._places: dict[int, int] = {}
-
-    def roleNames(self) -> dict[int, QtCore.QByteArray]:
-        """Return the names of the roles."""
-        return {number: QtCore.QByteArray(name.encode()) for number, name in _NUMBERS.items()}
-
-    def rowCount(self, parent: _Index = QtCore.QModelIndex()) -> int:  # noqa: B008 - Qt's signature
-        """Return the number of rows."""
-        return 0 if parent.isValid() else len(self.rows)
-
-    def data(self, index: _Index, role: int = 0) -> Any:
-        """Return a role of a row."""
-        name = _NUMBERS.get(role)
-        if name is None or not 0 <= index.row() < len(self.rows):
-            return None
-        return _ROLES[name](self.rows[index.row()])
-
-    def show(self, rows: list[_Row]) -> None:
-        """Show these rows; views keep theirs while the names stay the same."""
-        if [id(row) for row in rows] == [id(row) for row in self.rows]:
-            return
-        self.beginResetModel()
-        self.rows = rows
-        self._places = {id(row): at for at, row in enumerate(rows)}
-        self.endResetModel()
-
-    def update(self, row: _Row) -> None:
-        """Notify views of a changed row."""
-        at = self._places.get(id(row))
-        if at is not None:
-            self.dataChanged.emit(self.index(at, 0), self.index(at, 0))
 
 
 class NodeParameters(Element):
@@ -211,8 +166,9 @@ class NodeParameters(Element):
         self._known: dict[str, _Row] = {}
         #: Changes to undo: name, value before, value after.
         self._history: list[tuple[str, Any, Any]] = []
-        self._rows = ParameterRows(self)
-        self._marked: set[str] = set()
+        self._rows = RowModel(self, list(_ROLES), lambda row, role: _ROLES[role](row))
+        #: When the marks of parameters that other clients changed end.
+        self._marked: dict[str, float] = {}
 
     rows = Property(QtCore.QObject, lambda self: self._rows, constant=True)
 
@@ -271,7 +227,7 @@ class NodeParameters(Element):
             return
         before, value = row.value, as_type(value, row.descriptor.type)
         row.pending, row.problem = row.pending + 1, ""
-        self._rows.update(row)
+        self._rows.changed(name)
 
         def done(reason: str | Error) -> None:
             if not is_alive(self) or config is not self._config:
@@ -283,7 +239,7 @@ class NodeParameters(Element):
             if not is_undo and not _is_same(before, value):
                 self._history = [*self._history, (name, before, value)][-_MAX_UNDO:]
             row.value, row.is_marked = value, False
-            self._rows.update(row)
+            self._rows.changed(name)
             self._show_undo()
             # The node may have set a different value.
             link.read_soon()
@@ -294,7 +250,7 @@ class NodeParameters(Element):
         row = self._known.get(name)
         if row is not None:
             row.problem = reason
-            self._rows.update(row)
+            self._rows.changed(name)
         self.rejected.emit(name, reason)
 
     def _show_undo(self) -> None:
@@ -351,23 +307,19 @@ class NodeParameters(Element):
         if link.problem or not link.ready:
             report(self, ready=False)
         now = self._steady()
-        for name in [name for name in self._marked if self._ends_mark(name, now)]:
-            self._marked.discard(name)
-
-    def _ends_mark(self, name: str, now: float) -> bool:
-        row = self._known.get(name)
-        if row is not None and now < row.marked_until:
-            return False
-        if row is not None:
-            row.is_marked = False
-            self._rows.update(row)
-        return True
+        ended = [name for name, until in self._marked.items() if now >= until]
+        for name in ended:
+            del self._marked[name]
+            if name in self._known:
+                self._known[name].is_marked = False
+        if ended:
+            self._rows.refresh()
 
     def _on_readings(self, readings: dict[str, Reading], whole: bool) -> None:
         link = self._endpoint
         if not is_alive(self) or link is None:
             return
-        appeared = False
+        appeared = changed = False
         for name, reading in readings.items():
             descriptor = reading.descriptor
             if descriptor is None:
@@ -377,7 +329,7 @@ class NodeParameters(Element):
                 made = _Row(name, reading.value, descriptor, reading.problem, reading.value)
                 self._known[name], appeared = made, True
                 continue
-            self._update_row(row, reading.value, descriptor)
+            changed |= self._update_row(row, reading.value, descriptor)
         if whole:
             gone = {name for name in self._known if readings.get(name) is None}
             gone |= {name for name, found in readings.items() if found.descriptor is None}
@@ -386,22 +338,23 @@ class NodeParameters(Element):
                 self._known.pop(name, None)
         if appeared:
             self._show_rows()
+        if changed:
+            self._rows.refresh()
         if whole and is_alive(self) and link is self._endpoint:
             report(self, ready=link.ready, total=len(self._known))
 
-    def _update_row(self, row: _Row, value: Any, descriptor: ParameterDescriptor) -> None:
+    def _update_row(self, row: _Row, value: Any, descriptor: ParameterDescriptor) -> bool:
         same = _is_same(row.value, value)
         if same and descriptor == row.descriptor:
-            return
+            return False
         if not same and not row.pending:
-            row.marked_until, row.is_marked = self._steady() + _MARK_S, True
-            self._marked.add(row.name)
+            self._marked[row.name], row.is_marked = self._steady() + _MARK_S, True
         row.value, row.descriptor = value, descriptor
-        self._rows.update(row)
+        return True
 
     def _show_rows(self) -> None:
         wanted = self.filter.lower()
-        rows = [row for name, row in sorted(self._known.items()) if wanted in name.lower()]
+        rows = {name: row for name, row in sorted(self._known.items()) if wanted in name.lower()}
         self._rows.show(rows)
         report(self, count=len(rows), total=len(self._known))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.controls.lists.rows import Rows
+from rosglass.controls.lists.row_model import RowModel
 from rosglass.controls.lists.texts import bounded, copy_text
 from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS
 from rosglass.qml.elements.tf_buffer import TfBuffer
@@ -50,7 +50,7 @@ class TfRows(TfBuffer):
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
-        self._model = Rows(self, _ROLES)
+        self._model = RowModel(self, _ROLES)
         self._folded: set[str] = set()
         self._ticks = 0
         self._tree = _Tree({}, {}, 0)

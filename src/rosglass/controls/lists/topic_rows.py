@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.names import hidden
-from rosglass.controls.lists.rows import Rows
+from rosglass.controls.lists.row_model import RowModel
 from rosglass.controls.lists.texts import copy_text, joined
 from rosglass.controls.topics.graph_watch import GraphReader
 from rosglass.qml.engine.dialect import resolve_namespace
@@ -119,7 +119,7 @@ class TopicRows(GraphReader):
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
-        self._model = Rows(self, _ROLES)
+        self._model = RowModel(self, _ROLES)
         self._topics: dict[str, Topic] = {}
         #: Namespaces that are folded, and topics whose details are shown.
         self._folded: set[str] = set()

@@ -116,7 +116,7 @@ LiveFrame {
         objectName: "list"
         anchors { top: parent.top; left: parent.left; right: parent.right; bottom: bar.visible ? bar.top : parent.bottom; bottomMargin: bar.visible ? Theme.gap / 2 : 0 }
         name: list.title
-        model: alarms.model
+        model: alarms.rows
         moreTint: Theme.warn
         more: {
             const parts = []

@@ -51,7 +51,7 @@ LiveFrame {
         objectName: "list"
         anchors.fill: parent
         name: diagnostics.title
-        model: live.model
+        model: live.rows
         // The worst are above: what is below is as bad only if what is hidden first is.
         moreTint: live.omitted ? Theme.warn : Theme.dim
         more: {
@@ -110,7 +110,7 @@ LiveFrame {
                     id: first
                     anchors { right: parent.right; rightMargin: Theme.gap; verticalCenter: parent.verticalCenter }
                     width: Math.min(implicitWidth, row.width * 0.25)
-                    text: model.silent < 0 && model.values.length && !model.unfolded ? model.values[0].value : ""
+                    text: model.silent < 0 && model.values.length && !model.open ? model.values[0].value : ""
                     maximumLineCount: 1
                     color: Theme.dim
                     font.pixelSize: Theme.small
@@ -124,7 +124,7 @@ LiveFrame {
             }
             Loader {
                 id: details
-                active: model.unfolded
+                active: model.open
                 anchors { top: line.bottom; left: parent.left; leftMargin: Theme.gap * 1.5; right: parent.right; rightMargin: Theme.gap }
                 sourceComponent: Column {
                     ThemeText {
@@ -172,7 +172,7 @@ LiveFrame {
                     }
                 }
             }
-            readonly property var values_: model.unfolded ? model.values : []
+            readonly property var values_: model.open ? model.values : []
             readonly property int more_: model.more
         }
     }

@@ -72,7 +72,7 @@ LiveFrame {
         objectName: "list"
         anchors.fill: parent
         name: joints.title
-        model: live.model
+        model: live.rows
         moreTint: Theme.warn
         more: {
             const parts = []

@@ -108,7 +108,7 @@ LiveFrame {
         objectName: "list"
         anchors { top: bar.visible ? bar.bottom : parent.top; topMargin: bar.visible ? Theme.gap / 2 : 0; left: parent.left; right: parent.right; bottom: details.visible ? details.top : parent.bottom }
         name: log.title
-        model: live.model
+        model: live.rows
         moreTint: live.lost ? Theme.warn : Theme.dim
         more: {
             const parts = []
@@ -184,7 +184,7 @@ LiveFrame {
         function onMovementEnded() { log.follow_ = list.view.atYEnd }
     }
     Connections {
-        target: live.model
+        target: live.rows
         function onRowsInserted() { if (log.follow_) Qt.callLater(log.toEnd_) }
         function onModelReset() { if (log.follow_) Qt.callLater(log.toEnd_) }
     }

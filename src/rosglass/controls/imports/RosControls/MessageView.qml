@@ -83,7 +83,7 @@ LiveFrame {
         objectName: "tree"
         anchors { top: heading.bottom; topMargin: Theme.gap / 2; left: parent.left; right: parent.right; bottom: footer.top }
         name: view.title
-        rows: messages.rows
+        model: messages.rows
         delegate: rowOf
         onToggled: function(key) { messages.toggle(key) }
         onCopied: function(key) { messages.copy(key) }

@@ -50,7 +50,7 @@ LiveFrame {
         objectName: "tree"
         anchors { top: field.bottom; topMargin: Theme.gap / 2; left: parent.left; right: parent.right; bottom: parent.bottom }
         name: view.title
-        rows: frames.rows
+        model: frames.rows
         delegate: rowOf
         onToggled: function(key) { frames.toggle(key) }
         onCopied: function(key) { frames.copy(key) }

@@ -4,22 +4,22 @@ import QtQuick 2.15
 FocusScope {
     id: tree
 
-    // A model with the roles key, depth, folds, open and row, such as TopicRows.rows.
-    property var rows: null
+    // Rows with the roles key, depth, folds, open and row, such as those of TopicRows.
+    property var model: null
     // What a row shows; it sees `row` (the roles) and `current`, and says in `label` what it reads out.
     property Component delegate: null
     // What the tree shows, for screen readers.
     property string name
     // The key of the current row; empty without rows.
-    readonly property string current: rows && list.count > 0 ? key_(list.currentIndex) : ""
+    readonly property string current: model && list.count > 0 ? key_(list.currentIndex) : ""
 
     signal toggled(string key)
     signal activated(string key)
     signal copied(string key)
 
-    function key_(row) { return rows.value(row, "key") || "" }
+    function key_(row) { return model.value(row, "key") || "" }
     function toggle_(row, open) {
-        if (rows.value(row, "folds") && (open === undefined || rows.value(row, "open") !== open)) {
+        if (model.value(row, "folds") && (open === undefined || model.value(row, "open") !== open)) {
             toggled(key_(row))
             return true
         }
@@ -36,7 +36,7 @@ FocusScope {
         boundsBehavior: Flickable.StopAtBounds
         highlightMoveDuration: 0
         cacheBuffer: 0
-        model: tree.rows
+        model: tree.model
         onCountChanged: if (currentIndex < 0 && count > 0) currentIndex = 0
         Accessible.role: Accessible.Tree
         Accessible.name: tree.name
@@ -47,10 +47,10 @@ FocusScope {
             event.accepted = true
             if (event.key === Qt.Key_Right) {
                 if (!tree.toggle_(currentIndex, true) && currentIndex + 1 < count
-                        && tree.rows.parentOf(currentIndex + 1) === currentIndex)
+                        && tree.model.parentOf(currentIndex + 1) === currentIndex)
                     currentIndex += 1
             } else if (event.key === Qt.Key_Left) {
-                const above = tree.rows.parentOf(currentIndex)
+                const above = tree.model.parentOf(currentIndex)
                 if (!tree.toggle_(currentIndex, false) && above >= 0)
                     currentIndex = above
             } else if (event.key === Qt.Key_Space) {

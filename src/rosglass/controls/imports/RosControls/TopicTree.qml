@@ -47,7 +47,7 @@ LiveFrame {
         objectName: "tree"
         anchors { top: field.bottom; topMargin: Theme.gap / 2; left: parent.left; right: parent.right; bottom: parent.bottom }
         name: view.title
-        rows: topics.rows
+        model: topics.rows
         delegate: rowOf
         onToggled: function(key) { topics.toggle(key) }
         onActivated: function(key) { if (view.selected === key) view.activated(key) }
