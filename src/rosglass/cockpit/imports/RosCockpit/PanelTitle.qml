@@ -1,0 +1,66 @@
+// The slim title bar of a panel.
+import QtQuick 2.15
+import RosControls 1.0
+
+FocusScope {
+    id: bar
+
+    property Item panel: null
+    readonly property Item cockpit_: panel ? panel.cockpit_ : null
+
+    focus: true
+    Accessible.role: Accessible.TitleBar
+    Accessible.name: panel ? panel.title : ""
+    Accessible.focusable: true
+
+    function rename() {
+        field.active = true
+    }
+
+    HoverHandler { id: hover }
+    PanelGrip {
+        anchors.fill: parent
+        panel: bar.panel
+    }
+    ThemeText {
+        anchors { left: parent.left; leftMargin: Theme.gap * 0.8; right: buttons.left; verticalCenter: parent.verticalCenter }
+        visible: !field.active
+        text: bar.panel ? bar.panel.title : ""
+        color: bar.panel && bar.panel.current_ ? Theme.text : Theme.dim
+        font { pixelSize: Theme.small; weight: Font.DemiBold }
+    }
+    FocusRing { anchors.margins: 1; radius: Theme.radius / 2; visible: bar.activeFocus && !field.active }
+    PanelButtons {
+        id: buttons
+        anchors { right: parent.right; top: parent.top; bottom: parent.bottom }
+        panel: bar.panel
+        hovered: hover.hovered
+    }
+    Loader {
+        id: field
+        anchors { left: parent.left; right: buttons.left; verticalCenter: parent.verticalCenter }
+        active: false
+        sourceComponent: ThemeField {
+            objectName: "titleField"
+            height: bar.height
+            topPadding: 0
+            bottomPadding: 0
+            font.pixelSize: Theme.small
+            text: bar.panel.title
+            placeholderText: qsTr("Title")
+            Component.onCompleted: {
+                forceActiveFocus()
+                selectAll()
+            }
+            onEditingFinished: if (field.active) done_(true)
+            Keys.onEscapePressed: done_(false)
+            function done_(keep) {
+                const wanted = text.trim()
+                field.active = false
+                bar.forceActiveFocus()
+                if (keep && wanted !== bar.panel.title && bar.cockpit_)
+                    bar.cockpit_.renamed(bar.panel, wanted)
+            }
+        }
+    }
+}

@@ -1,0 +1,53 @@
+// The bar of Tabs: a button for each of its panels, and the buttons of the one that is shown.
+import QtQuick 2.15
+import RosControls 1.0
+
+Rectangle {
+    id: bar
+
+    property Item tabs: null
+    readonly property Item panel_: tabs && tabs.currentItem && tabs.currentItem.element_ === "panel" ? tabs.currentItem : null
+
+    height: Math.round(26 * Theme.size)
+    color: Theme.panel
+    radius: Theme.radius / 2
+    Accessible.role: Accessible.PageTabList
+    Accessible.name: qsTr("Tabs")
+
+    // The number of the tab under a point of this item; -1 without one.
+    function indexAt(x, y) {
+        const button = row.childAt(x - row.x, y - row.y)
+        return button && button.number_ !== undefined ? button.number_ : -1
+    }
+
+    HoverHandler { id: hover }
+    Row {
+        id: row
+        anchors { left: parent.left; top: parent.top; bottom: parent.bottom }
+        Repeater {
+            model: bar.tabs ? bar.tabs.elements_ : []
+            TabButton {
+                id: tab
+                readonly property int number_: index
+                readonly property Item element_: modelData
+                objectName: "tab" + index
+                height: row.height
+                width: Math.min(implicitWidth, (bar.width - buttons.width) / Math.max(1, bar.tabs.count))
+                text: element_ && element_.title ? element_.title : qsTr("Tab %1").arg(index + 1)
+                selected: bar.tabs.currentItem === element_
+                onClicked: bar.tabs.show(index)
+                PanelGrip {
+                    anchors.fill: parent
+                    panel: tab.element_ && tab.element_.element_ === "panel" ? tab.element_ : null
+                    onClicked: bar.tabs.show(tab.number_)
+                }
+            }
+        }
+    }
+    PanelButtons {
+        id: buttons
+        anchors { right: parent.right; top: parent.top; bottom: parent.bottom }
+        panel: bar.panel_
+        hovered: hover.hovered
+    }
+}
