@@ -113,7 +113,8 @@ class Panel:
         line: What it shows, in one line.
         icon: One letter or sign.
         snippet: The QML object to insert.
-        imports: Modules that the snippet needs, as after ``import``.
+        imports: Modules that the snippet needs, as after ``import``; for a panel from a folder, the
+            folder's URL, for which a layout in or beside it writes a relative path.
         types: Message types of the topics that it shows, best first.
         page: Address of its page below that of the documentation; empty without one.
         properties: What its form shows.
@@ -270,7 +271,7 @@ def _file_panel(file: Path) -> Panel:
         line,
         name[:1].upper(),
         f"{name} {{}}",
-        imports=(f'"{file.parent.as_posix()}"',),
+        imports=(f'"{file.parent.absolute().as_uri()}"',),
         types=types,
         properties=properties_of(text, types),
         file=str(file),

@@ -106,7 +106,7 @@ def test_panels_of_a_folder(tmp_path: Path) -> None:
     (tmp_path / "Empty.qml").write_text("")
     found = {panel.name: panel for panel in panels.folder_panels(tmp_path)}
     assert found["Arm"].line == "The arm, of sensor_msgs/JointState."
-    assert found["Arm"].imports == (f'"{tmp_path.as_posix()}"',)
+    assert found["Arm"].imports == (f'"{tmp_path.as_uri()}"',)
     assert found["Arm"].properties[0].unit == "°"
     assert "capital" in found["small"].problem
     assert str(tmp_path / "Broken.qml") in found["Broken"].problem
