@@ -16,7 +16,7 @@ from rosglass.cli.connecting import End, connect
 from rosglass.cli.output import CLEAR_REST, HOME, Style, note, require_reader
 from rosglass.comm import anonymous_name
 from rosglass.controls.plots.axes import Axis, number_text
-from rosglass.controls.plots.raster import Raster, background, outline
+from rosglass.controls.plots.raster import Background, Raster, outline
 from rosglass.controls.plots.series import FieldFeed, PlotReceiver, TopicFeed, split_path
 
 if TYPE_CHECKING:
@@ -225,8 +225,9 @@ class TextPlot:
             np.minimum(gaps, across),
         )
         # As the window's image, with the number of the line in place of its colour.
-        raster = Raster(across, down, background(down, 0, 0, []))
-        raster.draw(shown, np.arange(1, len(lines) + 1, dtype=np.uint32), [], 0, 0)
+        raster = Raster(across, down)
+        colors = np.arange(1, len(lines) + 1, dtype=np.uint32)
+        raster.draw(shown, colors, [], Background(0, 0, ()), 0, 0)
         dots = raster.pixels.reshape(rows, 4, columns, 2)
         owner = dots.max(axis=(1, 3)).astype(int) - 1
         bits = ((dots > 0) * np.array(_BITS).T[None, :, None, :]).sum(axis=(1, 3))

@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rosglass.controls.plots.raster import Curve, Raster, background, outline
+from rosglass.controls.plots.raster import Background, Curve, Raster, outline
 
 WIDTH, HEIGHT = 60, 40
-EMPTY, COLORS = 0, np.array([1, 2, 3], np.uint32)
+EMPTY, COLORS = Background(0, 0, ()), np.array([1, 2, 3], np.uint32)
 
 
 def drawn(low: np.ndarray, high: np.ndarray, first: int = 0, most: int = 5) -> np.ndarray:
     """Return the pixels of lines, whose values are pixels from the bottom."""
     raster = made()
-    raster.draw(extents(low, high, most), COLORS, [], first, 0)
+    raster.draw(extents(low, high, most), COLORS, [], EMPTY, first, 0)
     return pixels(raster)
 
 
 def made() -> Raster:
-    return Raster(WIDTH, HEIGHT, background(HEIGHT, EMPTY, EMPTY, []))
+    return Raster(WIDTH, HEIGHT)
 
 
 def extents(low: np.ndarray, high: np.ndarray, most: int = 5) -> object:
@@ -91,9 +91,40 @@ def test_scrolling_paints_what_painting_anew_does() -> None:
         high[:] = low + 3
         fresh = WIDTH - moved - 1 if moved else 0
         shown = extents(low, high)
-        raster.draw(shown, COLORS, [], first, fresh)
+        raster.draw(shown, COLORS, [], EMPTY, first, fresh)
         # The first column is still connected with the one that has left the image.
         assert np.array_equal(pixels(raster)[:, 1:], drawn(low, high, first)[:, 1:])
+
+
+def test_later_lines_cover_earlier_ones() -> None:
+    random = np.random.default_rng(4)
+    low, high = empty(150)
+    low[:] = random.integers(-20, HEIGHT + 20, low.shape)
+    high[:] = low + random.integers(0, 8, low.shape)
+    colors = np.arange(1, 151, dtype=np.uint32)
+    raster = made()
+    raster.draw(extents(low, high, most=0), colors, [], EMPTY, 0, 0)
+    wanted = np.zeros((HEIGHT, WIDTH), np.uint32)
+    for line in range(150):
+        for column in range(WIDTH):
+            top, bottom = (HEIGHT - 1 - int(end[line, column]) for end in (high, low))
+            wanted[max(top, 0) : max(bottom + 1, 0), column] = colors[line]
+    assert np.array_equal(pixels(raster), wanted)
+
+
+def test_image_that_moves_to_the_end_of_its_memory_is_the_same() -> None:
+    low, high = empty()
+    low[:] = high[:] = np.arange(WIDTH) % HEIGHT
+    raster = made()
+    raster.draw(extents(low, high), COLORS, [], EMPTY, 0, 0)
+    whole = pixels(raster)
+    for moved in (1, WIDTH - 1, WIDTH // 2, WIDTH - 2, 3):
+        before, first = pixels(raster), raster._first + moved
+        raster.draw(extents(*empty()), COLORS, [], EMPTY, first, WIDTH - moved)
+        assert np.array_equal(pixels(raster)[:, :-moved], before[:, moved:])
+        assert not pixels(raster)[:, -moved:].any()
+    raster.draw(extents(low, high), COLORS, [], EMPTY, raster._first, 0)
+    assert np.array_equal(pixels(raster), whole)
 
 
 def test_curve_is_drawn_inside_the_image_only() -> None:
@@ -101,19 +132,19 @@ def test_curve_is_drawn_inside_the_image_only() -> None:
     angle = np.linspace(0, 2 * np.pi, 200)
     x, y = 30 + 60 * np.cos(angle), 20 + 15 * np.sin(angle)
     x[50] = np.nan
-    raster.draw(extents(*empty()), COLORS, [Curve(x, y, 9)], 0, 0)
+    raster.draw(extents(*empty()), COLORS, [Curve(x, y, 9)], EMPTY, 0, 0)
     shown = pixels(raster)
     assert set(np.unique(shown)) == {0, 9}
     assert shown[5, 20] == 9
-    raster.draw(extents(*empty()), COLORS, [Curve(x * 1e9, y * 1e9, 9)], 0, 0)
+    raster.draw(extents(*empty()), COLORS, [Curve(x * 1e9, y * 1e9, 9)], EMPTY, 0, 0)
 
 
 def test_grid_is_below_the_lines() -> None:
-    rows = background(HEIGHT, 4, 5, [3, -1, HEIGHT])
-    raster = Raster(WIDTH, HEIGHT, rows)
+    rows = Background(4, 5, (3, -1, HEIGHT))
+    raster = made()
     low, high = empty()
     low[0, 10], high[0, 10] = 0, HEIGHT
-    raster.draw(extents(low, high), COLORS, [], 0, 0)
+    raster.draw(extents(low, high), COLORS, [], rows, 0, 0)
     shown = pixels(raster)
     assert shown[3, 9] == 5
     assert shown[4, 9] == 4

@@ -91,15 +91,14 @@ class PlotLines(QtQuick.QQuickItem):
             return
         key, first, start, rows = view
         colours = (self._background.rgb() & 0xFFFFFFFF, self._grid.rgb() & 0xFFFFFFFF)
-        background = kit.background(height, *colours, rows)
-        key = (key, width, height, background.tobytes(), colors.tobytes())
+        background = kit.Background(*colours, tuple(rows))
+        key = (key, width, height, background, colors.tobytes())
         if self._raster is None or (self._raster.width, self._raster.height) != (width, height):
-            self._raster = kit.Raster(width, height, background)
+            self._raster = kit.Raster(width, height)
         if key != self._drawn or curves:
-            self._raster.background = background
             start = 0
         self._drawn = key
-        self._raster.draw(shown, colors, curves, first, start)
+        self._raster.draw(shown, colors, curves, background, first, start)
         self._is_changed = True
         self.update()
 
