@@ -41,7 +41,8 @@ Item {
     ]
 
     default property alias content: area.data
-    readonly property alias holder_: area
+    readonly property alias holder_: stage
+    readonly property alias bar_: bar
 
     property Item maximized_: null
     property bool halting_: false
@@ -92,7 +93,7 @@ Item {
     // The panels of the page and of all windows, in the order of the file.
     function panels() {
         let found = [], waiting = windows.map(one => one.holder_).reverse()
-        waiting.push(page || area)
+        waiting.push(page || stage)
         while (waiting.length) {
             const item = waiting.pop()
             if (item.element_ === "panel")
@@ -127,17 +128,20 @@ Item {
     }
 
     function arrange() {
-        let foundPages = [], foundWindows = []
+        if (arranging_)
+            return
+        arranging_ = true
         for (const child of Elements.list(area.children)) {
-            if (child.element_ === "page")
-                foundPages.push(child)
-            else if (child.element_ === "window")
-                foundWindows.push(child)
-            else if (child.element_ !== undefined)
-                child.anchors.fill = area
+            if (child.element_ !== undefined && child.element_ !== "window")
+                child.parent = stage
         }
-        pages = foundPages
-        windows = foundWindows
+        for (const child of Elements.list(stage.children)) {
+            if (child.element_ !== "page")
+                child.anchors.fill = stage
+        }
+        pages = Elements.list(stage.children).filter(child => child.element_ === "page")
+        windows = Elements.list(area.children).filter(child => child.element_ === "window")
+        arranging_ = false
     }
 
     onPageChanged: {
@@ -149,12 +153,15 @@ Item {
     onEditingChanged: {
         maximized_ = null
         halt()
+        for (const panel of panels())
+            panel.attach()
     }
     onPageIndexChanged: {
         if (complete_ && !(pageIndex >= 0 && pageIndex < Math.max(1, pages.length)))
             console.error("Cockpit.pageIndex is from 0 to " + (pages.length - 1) + "; got " + pageIndex)
     }
     property bool complete_: false
+    property bool arranging_: false
     Component.onCompleted: {
         arrange()
         complete_ = true
@@ -189,8 +196,14 @@ Item {
         onLoaded: item.cockpit = cockpit
     }
     Item {
-        id: area
+        id: stage
         anchors { left: parent.left; right: parent.right; top: bar.bottom; bottom: parent.bottom }
+        onChildrenChanged: if (cockpit.complete_) cockpit.arrange()
+    }
+    // What is written beside the pages is above them, and at home here: windows, commands, an emergency stop.
+    Item {
+        id: area
+        anchors.fill: stage
         enabled: !cockpit.halting_
         onChildrenChanged: if (cockpit.complete_) cockpit.arrange()
     }

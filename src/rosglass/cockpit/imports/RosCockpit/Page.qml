@@ -1,6 +1,7 @@
 // One page of a Cockpit; only one is shown at a time. Several children are side by side, as in a Split.
 import QtQuick 2.15
 import RosControls 1.0
+import "elements.js" as Elements
 
 Split {
     id: page
@@ -8,11 +9,13 @@ Split {
     element_: "page"
     // Its name on the bar.
     property string title
+    readonly property bool isShown_: !cockpit_ || cockpit_.page === page
 
     anchors { fill: parent; margins: spacing }
-    // Below what is written beside the pages.
-    z: -1
-    visible: !cockpit_ || cockpit_.page === page
+    // A page from which a panel is dragged to another one keeps the mouse.
+    visible: isShown_ || (cockpit_.drag_ && cockpit_.drag_.panel && Elements.contains(page, cockpit_.drag_.panel)) === true
+    opacity: isShown_ ? 1 : 0
+    z: isShown_ ? 1 : 0
     Accessible.role: Accessible.Pane
     Accessible.name: title
 }

@@ -37,6 +37,21 @@ Rectangle {
                 hint: index < 9 ? qsTr("Ctrl+%1").arg(index + 1) : ""
                 selected: bar.cockpit.page === page_
                 onClicked: bar.cockpit.showPage(index)
+                Keys.onPressed: function(event) {
+                    if (edit.item)
+                        event.accepted = edit.item.key(event)
+                }
+                Loader {
+                    id: edit
+                    anchors.fill: parent
+                    active: bar.cockpit !== null && bar.cockpit.editing
+                    source: "PageEdit.qml"
+                    onLoaded: {
+                        item.bar = bar
+                        item.page = parent.page_
+                        item.index = index
+                    }
+                }
             }
         }
     }

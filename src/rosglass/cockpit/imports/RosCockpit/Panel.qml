@@ -161,9 +161,10 @@ Item {
         }
         PanelTitle {
             id: bar
+            z: 1
             anchors { left: parent.left; right: parent.right; top: parent.top }
-            height: visible ? Math.round(24 * Theme.size) : 0
-            visible: panel.tabs_ === null || panel.detached
+            // Tabs have the titles of theirs.
+            height: panel.tabs_ === null || panel.detached ? Math.round(24 * Theme.size) : 0
             panel: panel
         }
         Item {

@@ -12,37 +12,49 @@ FocusScope {
     Accessible.role: Accessible.TitleBar
     Accessible.name: panel ? panel.title : ""
     Accessible.focusable: true
+    Keys.onPressed: function(event) {
+        if (cockpit_ && cockpit_.drag_)
+            event.accepted = cockpit_.drag_.key(panel, event)
+    }
 
     function rename() {
         field.active = true
     }
 
-    HoverHandler { id: hover }
-    PanelGrip {
+    // Nothing of it exists for a panel in tabs.
+    Loader {
+        id: face
         anchors.fill: parent
-        panel: bar.panel
-    }
-    ThemeText {
-        anchors { left: parent.left; leftMargin: Theme.gap * 0.8; right: buttons.left; verticalCenter: parent.verticalCenter }
-        visible: !field.active
-        text: bar.panel ? bar.panel.title : ""
-        color: bar.panel && bar.panel.current_ ? Theme.text : Theme.dim
-        font { pixelSize: Theme.small; weight: Font.DemiBold }
-    }
-    FocusRing { anchors.margins: 1; radius: Theme.radius / 2; visible: bar.activeFocus && !field.active }
-    PanelButtons {
-        id: buttons
-        anchors { right: parent.right; top: parent.top; bottom: parent.bottom }
-        panel: bar.panel
-        hovered: hover.hovered
+        active: bar.height > 0
+        sourceComponent: Item {
+            HoverHandler { id: hover }
+            PanelGrip {
+                anchors.fill: parent
+                panel: bar.panel
+            }
+            ThemeText {
+                anchors { left: parent.left; leftMargin: Theme.gap * 0.8; right: buttons.left; verticalCenter: parent.verticalCenter }
+                visible: !field.active
+                text: bar.panel ? bar.panel.title : ""
+                color: bar.panel && bar.panel.current_ ? Theme.text : Theme.dim
+                font { pixelSize: Theme.small; weight: Font.DemiBold }
+            }
+            FocusRing { anchors.margins: 1; radius: Theme.radius / 2; visible: bar.activeFocus && !field.active }
+            PanelButtons {
+                id: buttons
+                anchors { right: parent.right; top: parent.top; bottom: parent.bottom }
+                panel: bar.panel
+                hovered: hover.hovered
+            }
+        }
     }
     Loader {
         id: field
-        anchors { left: parent.left; right: buttons.left; verticalCenter: parent.verticalCenter }
+        anchors { left: parent.left; right: parent.right; verticalCenter: parent.verticalCenter }
         active: false
         sourceComponent: ThemeField {
             objectName: "titleField"
-            height: bar.height
+            height: Math.max(bar.height, Math.round(24 * Theme.size))
             topPadding: 0
             bottomPadding: 0
             font.pixelSize: Theme.small

@@ -76,7 +76,6 @@ Item {
                 id: body
                 anchors { fill: parent; margins: spacing }
                 orientation: panelWindow.orientation
-                enabled: !cockpit_ || !cockpit_.halting_
             }
         }
     }

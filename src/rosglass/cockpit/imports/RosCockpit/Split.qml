@@ -27,6 +27,7 @@ Item {
     property real minimumWidth_: least_
     property real minimumHeight_: least_
     property bool complete_: false
+    readonly property var handles_: handles.item
     // While an edge is dragged: the shares to show.
     property var preview_: null
 
@@ -65,16 +66,18 @@ Item {
         wide += Math.max(0, all.length - 1) * spacing
         minimumWidth_ = vertical_ ? high : wide
         minimumHeight_ = vertical_ ? wide : high
-        for (const child of all)
+        for (const child of all) {
             if (child.shown_ !== undefined)
                 child.shown_ = only === null || child === only
+            // Its own `visible` may be a binding.
+            else if (only !== null && child !== only)
+                child.x = -100000
+        }
         if (only !== null)
             place_(only, 0, vertical_ ? height : width)
         else
             placeAll_(all)
         elements_ = all
-        if (handles.item)
-            handles.item.place()
     }
 
     function placeAll_(all) {

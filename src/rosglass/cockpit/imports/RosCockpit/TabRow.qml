@@ -14,10 +14,14 @@ Rectangle {
     Accessible.role: Accessible.PageTabList
     Accessible.name: qsTr("Tabs")
 
-    // The number of the tab under a point of this item; -1 without one.
-    function indexAt(x, y) {
-        const button = row.childAt(x - row.x, y - row.y)
-        return button && button.number_ !== undefined ? button.number_ : -1
+    // See Tabs.tabAt(); behind the last tab is its far side.
+    function tabAt(x, y) {
+        const last = row.children[tabs.count - 1]
+        const button = x >= row.width ? last : row.childAt(x, y)
+        if (!button || button.number_ === undefined)
+            return null
+        const after = x > button.x + button.width / 2
+        return { item: button.element_, edge: after ? "after" : "before", rect: Qt.rect(button.x + (after ? button.width : 0) - 2, 0, 4, height) }
     }
 
     HoverHandler { id: hover }

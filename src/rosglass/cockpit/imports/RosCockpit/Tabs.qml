@@ -61,6 +61,13 @@ Item {
         currentIndex = index
     }
 
+    // The tab under a point, which side of it, and where to draw a mark for that; null without one.
+    function tabAt(x, y) {
+        if (y >= bar.height)
+            return null
+        return bar.tabAt(x, y)
+    }
+
     function arrange() {
         if (!tabs || !area)
             return
