@@ -6,7 +6,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 1200; height: 720; visible: true; color: Theme.background
+    width: 1200 * Theme.size; height: 720 * Theme.size; visible: true; color: Theme.background
     title: "Operator screen"
     Component.onCompleted: Ros2.init("operator_screen")
 
@@ -28,7 +28,7 @@ Window {
             }
         }
         ColumnLayout {
-            Layout.maximumWidth: 240
+            Layout.maximumWidth: 240 * Theme.size
             EmergencyStop { id: stop; Layout.fillWidth: true; Layout.fillHeight: true }
             Battery { Layout.fillWidth: true }
             ServiceButton { Layout.fillWidth: true; service: "/flashlight/set"; request: ({ data: true }); text: "Light" }

@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 440; height: 260
+    width: 440 * Theme.size; height: 260 * Theme.size
     visible: true
     title: "AlarmList"
     color: Theme.background

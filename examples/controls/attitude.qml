@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 220; height: 220
+    width: 220 * Theme.size; height: 220 * Theme.size
     visible: true
     title: "Attitude"
     color: Theme.background

@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 480; height: 240
+    width: 480 * Theme.size; height: 240 * Theme.size
     visible: true
     title: "Compass"
     color: Theme.background

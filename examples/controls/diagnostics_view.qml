@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 420; height: 240
+    width: 420 * Theme.size; height: 240 * Theme.size
     visible: true
     title: "DiagnosticsView"
     color: Theme.background

@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 320; height: 240
+    width: 320 * Theme.size; height: 240 * Theme.size
     visible: true
     title: "DriveStick"
     color: Theme.background

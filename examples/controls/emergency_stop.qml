@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 220; height: 260
+    width: 220 * Theme.size; height: 260 * Theme.size
     visible: true
     title: "EmergencyStop"
     color: Theme.background

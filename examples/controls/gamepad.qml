@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 360; height: 260
+    width: 360 * Theme.size; height: 260 * Theme.size
     visible: true
     title: "Gamepad"
     color: Theme.background

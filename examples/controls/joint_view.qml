@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 340; height: 220
+    width: 340 * Theme.size; height: 220 * Theme.size
     visible: true
     title: "JointView"
     color: Theme.background

@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 320; height: 120
+    width: 320 * Theme.size; height: 120 * Theme.size
     visible: true
     title: "LiveFrame"
     color: Theme.background

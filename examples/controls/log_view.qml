@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 680; height: 300
+    width: 680 * Theme.size; height: 300 * Theme.size
     visible: true
     title: "LogView"
     color: Theme.background

@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 720; height: 420
+    width: 720 * Theme.size; height: 420 * Theme.size
     visible: true
     title: "MessageView"
     color: Theme.background

@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 720; height: 520
+    width: 720 * Theme.size; height: 520 * Theme.size
     visible: true
     title: "NodeGraph"
     color: Theme.background

@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 640; height: 360
+    width: 640 * Theme.size; height: 360 * Theme.size
     visible: true
     title: "Plot"
     color: Theme.background

@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 320; height: 250
+    width: 320 * Theme.size; height: 250 * Theme.size
     visible: true
     title: "RobotSwitch"
     color: Theme.background

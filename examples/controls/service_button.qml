@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 320; height: 130
+    width: 320 * Theme.size; height: 130 * Theme.size
     visible: true
     title: "ServiceButton"
     color: Theme.background

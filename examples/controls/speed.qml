@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 260; height: 120
+    width: 260 * Theme.size; height: 120 * Theme.size
     visible: true
     title: "Speed"
     color: Theme.background

@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 520; height: 300
+    width: 520 * Theme.size; height: 300 * Theme.size
     visible: true
     title: "TfTree"
     color: Theme.background

@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 520; height: 130
+    width: 520 * Theme.size; height: 130 * Theme.size
     visible: true
     title: "Timeline"
     color: Theme.background

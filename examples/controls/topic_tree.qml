@@ -4,7 +4,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 560; height: 420
+    width: 560 * Theme.size; height: 420 * Theme.size
     visible: true
     title: "TopicTree"
     color: Theme.background

@@ -9,7 +9,7 @@ Window {
 
     readonly property var options: JSON.parse(Qt.application.arguments[1])
 
-    width: 960; height: 540
+    width: 960 * Theme.size; height: 540 * Theme.size
     visible: true
     title: qsTr("Plot of %1").arg(options.paths.join(", ").slice(0, 200))
     color: Theme.background

@@ -298,3 +298,13 @@ def test_speed_says_why_the_robot_does_not_drive(shown: Any, controls: Any) -> N
     assert item.property("refusal") == "stop is pressed"
     assert controls.find("refusal").property("visible")
     assert not controls.find("readings").property("visible")
+
+
+def test_convention_lies_beside_the_ladder(controls: Any, wait: Any) -> None:
+    attitude = controls.show('Attitude { topic: "/imu"; width: 260; height: 200 }')
+    glass, axes = controls.find("glass"), controls.find("convention")
+    wait(lambda: axes.width() > 0 and axes.x() + axes.width() <= glass.x())
+    # Without room beside it, it is in the glass's corner, on a ground of its own.
+    attitude.setProperty("width", 170)
+    wait(lambda: axes.x() >= glass.x())
+    assert axes.property("color").alpha() == 255

@@ -414,3 +414,19 @@ def test_wheel_zooms_about_the_pointer_and_keys_move_and_turn(
     assert camera.scale == pytest.approx(scale)
     test.QTest.keyClick(controls.window, QtCore.Qt.Key.Key_F)
     assert view.property("follow")
+
+
+def test_buttons_of_a_small_map_are_behind_one(controls: Any, wait: Any) -> None:
+    view = controls.show("MapView { width: 240; height: 200 }")
+    bar = controls.find("tools")
+    wait(bar.isVisible)
+    assert not controls.find("goal").isVisible()
+    controls.click("tools")
+    wait(controls.find("goal").isVisible)
+    controls.click("goal")
+    wait(lambda: view.property("tool") == "goal")
+    # The map is free again for the goal.
+    assert not controls.find("goal").isVisible()
+    view.setProperty("width", 400)
+    wait(controls.find("goal").isVisible)
+    assert not bar.isVisible()

@@ -7,7 +7,7 @@ import RosControls 1.0
 
 Window {
     id: window
-    width: 1280; height: 752
+    width: 1280 * Theme.size; height: 752 * Theme.size
     visible: true
     title: "Cockpit"
     color: Theme.background

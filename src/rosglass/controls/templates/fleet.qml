@@ -7,7 +7,7 @@ import RosControls 1.0
 
 Window {
     id: window
-    width: 1200; height: 720
+    width: 1200 * Theme.size; height: 720 * Theme.size
     visible: true
     title: "Fleet"
     color: Theme.background

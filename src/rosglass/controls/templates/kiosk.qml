@@ -6,14 +6,14 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 1080; height: 720
+    width: 1080 * Theme.automaticScale; height: 720 * Theme.automaticScale
     visible: true
     title: "Our robot"
     color: Theme.background
     Component.onCompleted: {
         // Large and bright; rosglass run --kiosk fills the screen and cannot be closed.
         Theme.mode = "bright"
-        Theme.scale = 1.6
+        Theme.scale = 1.6 * Theme.automaticScale
         Ros2.init("kiosk")
     }
 

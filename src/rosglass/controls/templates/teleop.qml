@@ -5,7 +5,7 @@ import Ros2 1.0
 import RosControls 1.0
 
 Window {
-    width: 1000; height: 640
+    width: 1000 * Theme.size; height: 640 * Theme.size
     visible: true
     title: "Teleoperation"
     color: Theme.background

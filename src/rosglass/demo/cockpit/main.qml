@@ -13,7 +13,10 @@ Window {
     minimumHeight: Math.min(480, Screen.height)
     visible: true; color: Theme.background; title: "rosglass cockpit"
 
-    Component.onCompleted: Ros2.init("cockpit")
+    Component.onCompleted: {
+        Theme.scale = 1 // the zoom enlarges all
+        Ros2.init("cockpit")
+    }
 
     // Larger than full HD, everything grows: not all screens report their resolution.
     readonly property real zoom: Math.max(1, Math.min(width / 1920, height / 1080))

@@ -129,15 +129,26 @@ LiveFrame {
             width: 6; height: 6; radius: 3
             color: attitude.mark_
         }
-        ThemeText {
-            anchors { left: parent.left; bottom: parent.bottom; margins: Theme.gap / 2 }
-            text: attitude.convention.slice(0, 8)
-            font.pixelSize: Theme.small * 0.85
-        }
         Rectangle {
             anchors.fill: parent
             color: "transparent"
             border { color: attitude.steep ? Theme.bad : Theme.edge; width: attitude.steep ? 3 : 1 }
+        }
+    }
+    // Beside the ladder, where there is room; else on a ground of its own, as the ladder turns.
+    Rectangle {
+        objectName: "convention"
+        anchors { left: beside_ ? parent.left : glass.left; bottom: glass.bottom; margins: 1 }
+        readonly property bool beside_: (parent.width - glass.width) / 2 >= width + Theme.gap / 2
+        width: axes.width + Theme.gap * 0.6
+        height: axes.height + 2
+        color: Theme.panel
+        ThemeText {
+            id: axes
+            anchors.centerIn: parent
+            text: attitude.convention.slice(0, 8)
+            color: Theme.dim
+            font.pixelSize: Theme.small * 0.85
         }
     }
 }

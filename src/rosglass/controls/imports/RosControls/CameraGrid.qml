@@ -113,7 +113,9 @@ FocusScope {
         anchors.centerIn: parent
         width: Math.min(implicitWidth, parent.width)
         visible: grid.count_ === 0
-        text: qsTr("NO CAMERA FOUND")
+        text: Fields.unconnected(Ros2.connectionState, Ros2.connectionDetail) || qsTr("NO CAMERA FOUND")
+        wrapMode: Text.Wrap
+        horizontalAlignment: Text.AlignHCenter
         color: Theme.bad
         font.weight: Font.Bold
     }

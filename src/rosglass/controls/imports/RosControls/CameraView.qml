@@ -78,7 +78,7 @@ FocusScope {
     // Cameras that there are, by type.
     readonly property var cameras: Cameras.bases(finder.candidates)
     // What is wrong, in words; empty while it is live.
-    readonly property string status: live ? "" : headline_ + ": " + detail_
+    readonly property string status: live ? "" : headline_ + ": " + detail_ + (received && unconnected_ ? "; " + unconnected_ : "")
     // The file of the last snapshot.
     readonly property string snapshotFile: file_
 
@@ -100,10 +100,12 @@ FocusScope {
     property string file_
     property string message_
     property bool isWrong_: false
+    readonly property string unconnected_: Fields.unconnected(Ros2.connectionState, Ros2.connectionDetail)
     readonly property string headline_: frozen ? qsTr("IMAGE FROZEN") : !late ? qsTr("NO SIGNAL")
         : latency > 0 ? qsTr("IMAGE DELAYED") : qsTr("CLOCKS DIFFER")
     readonly property string detail_: frozen ? qsTr("images arrive, but have been equal for %1 s").arg(camera.unchanged.toFixed(0))
         : late ? qsTr("by %1 s").arg(Math.abs(latency / 1000).toFixed(1))
+        : !received && unconnected_ ? unconnected_
         : !topic_ ? qsTr("no camera found")
         : !received ? qsTr("no image received yet")
         : qsTr("last image %1 s old").arg(age.toFixed(1))
@@ -264,6 +266,9 @@ FocusScope {
                     anchors.horizontalCenter: parent.horizontalCenter
                     width: Math.min(implicitWidth, banner.most)
                     text: view.detail_
+                    wrapMode: Text.Wrap
+                    maximumLineCount: view.height > 120 * Theme.size ? 4 : 2
+                    horizontalAlignment: Text.AlignHCenter
                     font.pixelSize: Math.min(Theme.large, Math.max(Theme.small, view.width / 20))
                 }
                 ThemeText {
@@ -272,7 +277,7 @@ FocusScope {
                     width: Math.min(implicitWidth, banner.most)
                     visible: text !== "" && view.height > 120 * Theme.size
                     text: view.late ? qsTr("or the clocks of robot and operator differ by that much")
-                        : Fields.bounded(view.reason || camera.problem)
+                        : Fields.bounded(view.reason || (view.received && view.unconnected_) || camera.problem)
                     color: Theme.dim
                     wrapMode: Text.Wrap
                     maximumLineCount: 6
@@ -429,7 +434,8 @@ FocusScope {
         id: tools
         anchors { right: parent.right; bottom: parent.bottom; margins: Theme.gap }
         spacing: Theme.gap / 2
-        visible: view.tools && view.width > 3.5 * Theme.touch + 4 * Theme.gap && view.height > 2 * Theme.touch
+        // Before the first image there is nothing to save or turn, and the reason needs the room.
+        visible: view.tools && view.received && view.width > 3.5 * Theme.touch + 4 * Theme.gap && view.height > 2 * Theme.touch
 
         Rectangle {
             width: saveButton.implicitWidth; height: Theme.touch; radius: Theme.radius

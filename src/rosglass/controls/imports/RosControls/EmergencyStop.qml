@@ -377,11 +377,12 @@ Item {
                     horizontalAlignment: Text.AlignHCenter
                     wrapMode: Text.Wrap
                     maximumLineCount: 3
-                    text: stop.overdue ? qsTr("NOT CONFIRMED") + "\n" + (stop.problem || qsTr("sending…"))
+                    text: stop.overdue ? qsTr("NOT CONFIRMED") + "\n" + (stop.problem || (stop.connected_ ? qsTr("sending…") : qsTr("not connected")))
                         : stop.pending ? qsTr("sending…")
                         : stop.stopped ? (stop.wanted ? qsTr("confirmed")
                             : stop.contested ? qsTr("held by someone else") : stop.service && !stop.stateTopic ? qsTr("confirmed") : qsTr("by someone else"))
                         : stop.problem ? stop.problem
+                        : !stop.known && !stop.connected_ ? qsTr("not connected")
                         : stop.known || stop.service && !stop.stateTopic && stop.connected_ ? (stop.stopKeys.length ? stop.keyName_() : qsTr("press"))
                         : qsTr("state unknown")
                     color: stop.overdue ? Qt.lighter(Theme.emergencyCollar, 1.3) : Theme.emergencyText

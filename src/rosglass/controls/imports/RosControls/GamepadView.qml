@@ -18,6 +18,7 @@ LiveFrame {
     title: qsTr("Gamepad")
     source: null
     stale: !connected_
+    needsRobot: false
     problem: !gamepad ? qsTr("no Gamepad is set") : gamepad.problem ? gamepad.problem
         : !connected_ ? (gamepad.device ? qsTr("%1 is not connected").arg(gamepad.device) : qsTr("no gamepad is connected")) : ""
     note: connected_ ? gamepad.name : ""

@@ -64,6 +64,7 @@ LiveFrame {
 
     title: path.slice(path.lastIndexOf(".") + 1).slice(path.lastIndexOf(":") < path.lastIndexOf(".") ? 0 : path.lastIndexOf(":") + 1).slice(0, 60)
     source: live
+    filled: !isNaN(value)
     problem: live.problem
         || (!path ? qsTr("set path: \"topic:field\"") : "")
         || (from < to ? "" : qsTr("from %1 is not less than to %2").arg(from).arg(to))

@@ -198,20 +198,23 @@ LiveFrame {
         pixelsPerMetre: camera_.scale * scene_.stretch(camera_.centerY)
         longest: Math.min(120 * Theme.size, parent.width / 3)
     }
-    Row {
+    MapTools {
+        id: bar
+        view: plane
+        shown: view.tools
         visible: view.tools
-        anchors { left: parent.left; top: parent.top; margins: Theme.gap / 2 }
-        spacing: Theme.gap / 2
+        anchors { left: parent.left; right: parent.right; top: parent.top; margins: Theme.gap / 2 }
 
         MapButton {
             objectName: "follow"
+            visible: bar.unfolded
             text: qsTr("Follow")
             checkable: true
             checked: view.follow
             onClicked: view.follow = !view.follow
         }
-        MapButton { text: "+"; Accessible.name: qsTr("Zoom in"); onClicked: view.zoomBy(1.5) }
-        MapButton { text: "−"; Accessible.name: qsTr("Zoom out"); onClicked: view.zoomBy(1 / 1.5) }
-        MapButton { text: qsTr("Clear track"); visible: view.track; onClicked: scene_.clearTrack() }
+        MapButton { visible: bar.unfolded; text: "+"; Accessible.name: qsTr("Zoom in"); onClicked: view.zoomBy(1.5) }
+        MapButton { visible: bar.unfolded; text: "−"; Accessible.name: qsTr("Zoom out"); onClicked: view.zoomBy(1 / 1.5) }
+        MapButton { text: qsTr("Clear track"); visible: bar.unfolded && view.track; onClicked: scene_.clearTrack() }
     }
 }

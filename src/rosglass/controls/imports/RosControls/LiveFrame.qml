@@ -1,6 +1,8 @@
 // A titled frame that shows by itself when what is in it is out of date: dimmed, with a red edge, and
 // in words. Every control is one.
 import QtQuick 2.15
+import Ros2 1.0
+import "fields.js" as Fields
 
 Item {
     id: frame
@@ -15,6 +17,10 @@ Item {
     property real age: source && source.age !== undefined ? source.age : 0
     // Why nothing is received, or it cannot be shown; empty without a problem.
     property string problem: source && source.problem ? source.problem : ""
+    // Whether it is of no use without a connection to the robot; its status says so then.
+    property bool needsRobot: source !== null || stale
+    // Whether there is something to see, even if it is old.
+    property bool filled: age >= 0 && !(source && "message" in source && !source.message)
     // A short text beside the title, while nothing is wrong.
     property string note
     // Whether title and edge are drawn.
@@ -23,7 +29,7 @@ Item {
     property real contentWidth: 160 * Theme.size
     property real contentHeight: 60 * Theme.size
     // What is wrong, in words; empty if nothing is.
-    readonly property string status: problem ? problem
+    readonly property string status: reason_ ? reason_
         : !stale ? ""
         : age < 0 ? qsTr("NO DATA YET")
         : old_
@@ -38,8 +44,10 @@ Item {
     readonly property real inset: framed ? Theme.gap : 0
     readonly property string old_: qsTr("OLD: %1 s").arg(age < 10 ? age.toFixed(1) : age.toFixed(0))
     // Data that is shown, but old, has its age before the reason, of which the end may be cut.
-    readonly property bool dated_: problem !== "" && stale && age >= 0 && !!source && !!source.message
-    readonly property bool wrong: stale || problem !== ""
+    readonly property bool dated_: reason_ !== "" && stale && age > 0 && filled
+    readonly property bool wrong: stale || reason_ !== ""
+    // "No such topic yet" would be a guess without a connection.
+    readonly property string reason_: (needsRobot && Fields.unconnected(Ros2.connectionState, Ros2.connectionDetail)) || problem
 
     Accessible.role: Accessible.Grouping
     Accessible.name: title
@@ -61,7 +69,7 @@ Item {
         color: Theme.dim
         font { pixelSize: Theme.small; weight: Font.DemiBold; letterSpacing: 0.8; capitalization: Font.AllUppercase }
     }
-    ThemeText {
+    ThemeReason {
         id: aside
         anchors { right: parent.right; rightMargin: Theme.gap; top: parent.top; topMargin: Theme.gap * 0.6 }
         width: Math.min(implicitWidth, Math.max(0, frame.width - 2 * Theme.gap - (frame.framed && frame.title ? Math.min(heading.implicitWidth, frame.width / 2) + Theme.gap : 0)))
@@ -69,21 +77,21 @@ Item {
         objectName: "aside"
         text: frame.dated_ ? frame.old_ + " · " + frame.status : frame.status || frame.note
         color: frame.wrong ? Theme.bad : Theme.dim
-        font { pixelSize: Theme.small; weight: frame.wrong ? Font.Bold : Font.Normal }
+        font.weight: frame.wrong ? Font.Bold : Font.Normal
         horizontalAlignment: Text.AlignRight
     }
     Item {
         id: body
         anchors { top: parent.top; topMargin: frame.top_; left: parent.left; right: parent.right; bottom: parent.bottom; leftMargin: frame.inset; rightMargin: frame.inset; bottomMargin: frame.inset }
         opacity: frame.stale ? 0.35 : 1
-    }    // Where there is nothing else to show, what the heading has no room for.
-    ThemeText {
+    }
+    // Where there is nothing else to show, what the heading has no room for.
+    ThemeReason {
         objectName: "wholeProblem"
         anchors { fill: body; margins: frame.framed ? 0 : Theme.gap }
-        visible: aside.truncated && frame.problem !== "" && frame.stale && !!frame.source && !frame.source.message
-        text: frame.problem
+        visible: aside.truncated && frame.reason_ !== "" && frame.stale && !frame.filled
+        text: frame.reason_
         color: Theme.bad
-        font.pixelSize: Theme.small
         wrapMode: Text.Wrap
         verticalAlignment: Text.AlignVCenter
         horizontalAlignment: Text.AlignHCenter

@@ -120,6 +120,7 @@ LiveFrame {
     onFollowChanged: lookAtRobot_()
     onHeadingUpChanged: lookAtRobot_()
     onToolChanged: {
+        bar.open = false
         if (tool) {
             // What became of the last goal has been read.
             if (!goals_.active) {
@@ -234,15 +235,16 @@ LiveFrame {
             longest: Math.min(120 * Theme.size, parent.width / 3)
         }
     }
-    Flow {
+    MapTools {
         id: bar
+        view: plane
+        shown: view.tools
         visible: view.tools || goals_.active !== ""
         anchors { left: parent.left; right: parent.right; top: parent.top; margins: Theme.gap / 2 }
-        spacing: Theme.gap / 2
 
-        MapButton { objectName: "fit"; visible: view.tools; text: qsTr("Fit"); onClicked: view.fit() }
+        MapButton { objectName: "fit"; visible: bar.unfolded; text: qsTr("Fit"); onClicked: { bar.open = false; view.fit() } }
         MapButton {
-            visible: view.tools
+            visible: bar.unfolded
             text: qsTr("Follow")
             checkable: true
             checked: view.follow
@@ -250,7 +252,7 @@ LiveFrame {
         }
         MapButton {
             objectName: "goal"
-            visible: view.tools
+            visible: bar.unfolded
             text: qsTr("Goal")
             checkable: true
             checked: view.tool === "goal"
@@ -258,7 +260,7 @@ LiveFrame {
         }
         MapButton {
             objectName: "waypoints"
-            visible: view.tools
+            visible: bar.unfolded
             text: qsTr("Waypoints")
             checkable: true
             checked: view.tool === "waypoints"
@@ -273,7 +275,7 @@ LiveFrame {
         }
         MapButton {
             objectName: "pose"
-            visible: view.tools
+            visible: bar.unfolded
             text: qsTr("Pose")
             checkable: true
             checked: view.tool === "pose"
@@ -282,7 +284,7 @@ LiveFrame {
         MapButton {
             id: layersButton
             objectName: "layers"
-            visible: view.tools && scene_.layers.length > 1
+            visible: bar.unfolded && scene_.layers.length > 1
             text: qsTr("Layers")
             checkable: true
         }

@@ -56,6 +56,7 @@ LiveFrame {
 
     title: qsTr("Recorder")
     stale: false
+    needsRobot: true
     problem: Fields.bounded(recorder.problem)
     note: free < 0 ? "" : qsTr("%1 free").arg(Units.bytes(free))
     contentWidth: 300 * Theme.size

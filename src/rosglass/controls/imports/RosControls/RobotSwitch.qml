@@ -29,6 +29,7 @@ LiveFrame {
     title: qsTr("Robot")
     source: null
     stale: false
+    needsRobot: true
     age: 0
     problem: problem_
     contentWidth: 200 * Theme.size

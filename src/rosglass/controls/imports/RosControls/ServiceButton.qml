@@ -39,7 +39,7 @@ Item {
         : busy ? (ready ? qsTr("calling ...") : qsTr("waiting for %1 ...").arg(name_))
         // Also without a server: the robot may have done it before its answer was lost.
         : outcome_ === "failed" ? qsTr("FAILED: %1").arg(said_)
-        : !ready ? qsTr("NOT AVAILABLE: %1").arg(client_ && client_.problem ? Fields.bounded(client_.problem) : qsTr("no server of %1 yet").arg(name_))
+        : !ready ? unconnected_ || qsTr("NOT AVAILABLE: %1").arg(client_ && client_.problem ? Fields.bounded(client_.problem) : qsTr("no server of %1 yet").arg(name_))
         : outcome_ === "refused" ? qsTr("REFUSED: %1").arg(said_)
         : outcome_ === "done" ? (said_ ? qsTr("done: %1").arg(said_) : qsTr("done"))
         : ""
@@ -50,6 +50,7 @@ Item {
     signal answered(var response)
     signal failed(string reason)
 
+    readonly property string unconnected_: Fields.unconnected(Ros2.connectionState, Ros2.connectionDetail)
     readonly property string name_: Fields.resolve(ns, service)
     readonly property string key_: name_ + " " + type
     property var client_: null
@@ -174,13 +175,14 @@ Item {
         enabled: control.ready && !control.busy
         onActivated: control.call()
     }
-    ThemeText {
+    ThemeReason {
         objectName: "status"
         visible: control.showStatus
         anchors { left: parent.left; right: parent.right; top: button.bottom; topMargin: 2 }
+        wrapMode: Text.Wrap
+        maximumLineCount: Math.max(1, Math.floor((control.height - y) / (Theme.small * 1.4)))
         text: control.status
         color: control.busy ? Theme.dim : !control.ready || control.outcome === "refused" || control.outcome === "failed" ? Theme.bad
             : control.outcome === "done" ? Theme.good : Theme.dim
-        font.pixelSize: Theme.small
     }
 }

@@ -7,8 +7,22 @@ QtObject {
 
     // "dark" for rooms, "bright" for sunlight, "contrast" for eyes that need more.
     property string mode: "dark"
-    // 1 for a desktop; larger for touch with gloves, or a 4K screen that is not scaled.
-    property real scale: 1
+    // 1 for a desktop; larger for touch with gloves. Without a value of one's own, that of the screen.
+    property real scale: automaticScale
+    // What suits the first screen, by its size and its pixels per millimetre: from 1 to 4.
+    readonly property real automaticScale: {
+        const screens = Qt.application.screens
+        return screens && screens.length ? scaleFor_(screens[0].width, screens[0].height, screens[0].pixelDensity) : 1
+    }
+
+    // For a screen in (device-independent) pixels, and pixels per millimetre, which not all screens know.
+    function scaleFor_(width, height, density) {
+        const dpi = 25.4 * density
+        const fine = dpi >= 120 && dpi <= 600 ? dpi / 110 : 1
+        // A 4K screen shows what a full HD one does; on none there are less than 800x480 such pixels.
+        const wanted = Math.max(fine, Math.min(width / 1920, height / 1080))
+        return Math.max(1, Math.min(4, Math.round(4 * Math.min(wanted, width / 800, height / 480)) / 4)) || 1
+    }
 
     readonly property var modes: ["dark", "bright", "contrast"]
     readonly property var palette_: ({

@@ -30,7 +30,6 @@ LiveFrame {
     source: null
     stale: Ros2.connectionState !== "connected"
     age: -1
-    problem: stale ? Ros2.connectionDetail : ""
     contentWidth: 240 * Theme.size
     contentHeight: column.height
     Accessible.description: status || findings_.map(function(one) { return one.text }).join("; ")

@@ -6,6 +6,13 @@ function resolve(ns, name) {
     return ns && name && name[0] !== "/" && name[0] !== "~" ? ns.replace(/\/+$/, "") + "/" + name : name
 }
 
+// That the robot is not connected, in words; empty if it is. For Ros2.connectionState and Ros2.connectionDetail.
+function unconnected(state, detail) {
+    return state === "connected" ? ""
+        : state === "uninitialized" ? qsTr("the robot is not connected: Ros2.init() was not called")
+        : detail ? qsTr("the robot is not connected: %1").arg(bounded(detail)) : qsTr("the robot is not connected")
+}
+
 // A text of a robot, in a length that a control has room for.
 function bounded(text, most) {
     const limit = most || 300, whole = String(text === undefined || text === null ? "" : text).slice(0, 4 * limit)
