@@ -13,7 +13,7 @@ Window {
     AlarmList {
         anchors { fill: parent; margins: Theme.gap }
         topic: "/diagnostics"
-        level: "warning"
+        minLevel: "warning"
         topics: [
             { topic: "/emergency_stop/state", text: "Emergency stop" },
             { topic: "/flashlight/state", text: "Lamp is off", when: false, level: "warning" }

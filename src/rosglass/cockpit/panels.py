@@ -91,7 +91,7 @@ _TYPES = {
 #: Properties that a control changes itself: they are not settings.
 _STATES = {
     "AlarmList": ("muted",),
-    "CameraView": ("reason",),
+    "CameraView": ("problem",),
     "EmergencyStop": ("wanted", "overdue", "contested", "sent", "problem"),
     "LogView": ("paused",),
     "ModeSwitch": ("requested", "refusal"),

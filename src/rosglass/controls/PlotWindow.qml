@@ -23,6 +23,7 @@ Window {
         history: window.options.history
         folder: window.options.folder
         title: qsTr("Plot")
-        onSaved: function(file, problem) { problem ? console.error(problem) : console.info(qsTr("%1 was written").arg(file)) }
+        onSaved: function(file) { console.info(qsTr("%1 was written").arg(file)) }
+        onSaveFailed: function(reason) { console.error(reason) }
     }
 }

@@ -41,7 +41,7 @@ def test_goal_shows_progress_and_result(controls: Any, counter: Any, wait: Any) 
     assert panel.property("progress") == 1
     assert controls.find("said").property("text") == "6 numbers"
     assert controls.find("state").property("text") == "done"
-    assert not panel.property("active")
+    assert not panel.property("busy")
 
 
 def test_goal_is_canceled(controls: Any, counter: Any, wait: Any) -> None:
@@ -77,7 +77,7 @@ def test_form_has_the_fields_of_the_goal(controls: Any, counter: Any, wait: Any)
     wait(lambda: controls.find("field_order"))
     write(controls, "field_order", "four")
     assert controls.find("state").property("text") == "order is not a number"
-    assert not panel.property("active")
+    assert not panel.property("busy")
     write(controls, "field_order", "2.5")
     wait(lambda: "order: expected" in controls.find("state").property("text"))
     write(controls, "field_order", "4")

@@ -62,7 +62,7 @@ def test_first_alarm_is_marked(alarms: Any, wait: Any) -> None:
 
 
 def test_alarm_that_comes_again_or_gets_worse_is_news(alarms: Any, wait: Any) -> None:
-    view, publisher, rows = alarms('AlarmList { level: "warning" }')
+    view, publisher, rows = alarms('AlarmList { minLevel: "warning" }')
     publisher.publish(status=[part("motor", 1)])
     wait(lambda: view.property("unacknowledged") == 1)
     view.acknowledgeAll()

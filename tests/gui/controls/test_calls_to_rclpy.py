@@ -55,9 +55,9 @@ def test_controls_on_a_node_of_rclpy(live_controls: Any, robot: Any, wait: Any) 
     assert [speed.property(name) for name in ("low", "high", "step")] == [0, 2, 0.25]
     assert live_controls.find("editor", mode).property("count") == 2
     assert live_controls.find("row_serial").property("locked")
-    form.set("speed", 1)
+    form.setValue("speed", 1)
     wait(lambda: speed.property("value") == 1 and form.property("undoText") == "speed: 0.5")
-    form.set("speed", 2)
+    form.setValue("speed", 2)
     wait(lambda: "too fast" in speed.property("problem"))
     assert speed.property("value") == 1
     form.undo()

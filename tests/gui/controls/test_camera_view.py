@@ -135,7 +135,7 @@ def test_image_is_turned_and_filled(controls: Any, wait: Any) -> None:
     streaming(wait, camera, lambda: view.property("live"))
     assert view.property("imageRect").width() > view.property("imageRect").height()
     click(controls, "turn")
-    assert view.property("turn") == 90
+    assert view.property("imageRotation") == 90
     streaming(
         wait,
         camera,

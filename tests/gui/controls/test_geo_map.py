@@ -122,12 +122,12 @@ def test_lost_fix_is_said_and_the_last_position_stays(
     assert not controls.find("mark").isVisible()
     fix(publisher)
     wait(lambda: view.property("status") == "")
-    before = view.property("scene").x
+    before = view.property("scene").robotX
     assert controls.find("mark").isVisible()
     assert math.isnan(view.property("accuracy")), "an unknown covariance"
     fix(publisher, (0.0, 0.0), -1)
     wait(lambda: view.property("status") == "NO FIX: the last position is shown")
-    assert view.property("scene").x == before
+    assert view.property("scene").robotX == before
     assert math.isnan(view.property("latitude"))
     fix(publisher, (math.nan, 8.0))
     wait(lambda: "no valid position" in view.property("status"))
@@ -166,16 +166,16 @@ def test_moving_the_map_by_hand_ends_following(controls: Any, wait: Callable[...
     fix(publisher)
     wait(lambda: not view.property("stale"))
     camera, scene = view.property("camera"), view.property("scene")
-    assert camera.centerX == pytest.approx(scene.x)
+    assert camera.centerX == pytest.approx(scene.robotX)
     controls.find("plane").forceActiveFocus()
     test: Any = optional("QtTest")
     test.QTest.keyClick(controls.window, QtCore.Qt.Key.Key_Left)
     assert not view.property("follow")
     fix(publisher, (ZURICH[0] + 0.001, ZURICH[1]))
     wait(lambda: len(scene.track.points) == 2)
-    assert camera.centerX < scene.x - 1
+    assert camera.centerX < scene.robotX - 1
     view.setProperty("follow", True)
-    wait(lambda: camera.centerX == pytest.approx(scene.x))
+    wait(lambda: camera.centerX == pytest.approx(scene.robotX))
 
 
 def test_missing_tiles_are_parts_of_coarser_ones(tmp_path: Path) -> None:

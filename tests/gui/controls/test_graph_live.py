@@ -43,7 +43,7 @@ def test_latched_message_is_shown_and_published_back(live_controls: Any, wait: A
     wait(lambda: rows(live_controls, "value") == ["idle"])
     view.edit_()
     rows_of = live_controls.find("tree").property("model").parent()
-    assert rows_of.setValue("data", "drive")
+    assert rows_of.setText("data", "drive")
     view.publish_()
     wait(lambda: "drive" in [one.data for one in received])
 

@@ -266,7 +266,7 @@ def test_speed_of_a_twist(shown: Any, controls: Any, kind: str, fields: Any) -> 
     publish(**fields)
     assert controls.find("forward").property("value") == "36.0"
     assert controls.find("turn").property("value") == "0.00"
-    assert item.property("forward") == pytest.approx(10)
+    assert item.property("speed") == pytest.approx(10)
 
 
 def test_speed_takes_no_command_for_a_speed(controls: Any, wait: Any) -> None:

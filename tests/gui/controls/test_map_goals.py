@@ -211,7 +211,7 @@ def test_refused_and_failed_goals_say_why(
     wait(lambda: view.property("scene").property("goalAction"))
     view.setProperty("tool", "goal")
     hand.drag(3.0, 1.0, 3.5, 1.0)
-    wait(lambda: goals.property("bad"))
+    wait(lambda: goals.property("failed"))
     assert "Goal: refused: the server of /navigate_to_pose does not accept" in message(
         live_controls
     )
@@ -225,12 +225,12 @@ def test_refused_and_failed_goals_say_why(
     view.setProperty("tool", "goal")
     hand.drag(3.0, 1.0, 3.5, 1.0)
     wait(lambda: "not reached" in message(live_controls))
-    assert goals.property("bad")
+    assert goals.property("failed")
     nav2.end = lambda _: {}
     view.setProperty("tool", "goal")
     hand.drag(3.0, 1.0, 3.5, 1.0)
     wait(lambda: message(live_controls) == "Goal: reached")
-    assert not goals.property("bad")
+    assert not goals.property("failed")
 
 
 @zenoh
@@ -246,7 +246,7 @@ def test_goal_whose_server_disappears_has_an_unknown_outcome(
     nav2.end = lambda _: {}
     nav2.node.close()
     wait(lambda: view.property("goals").property("active") == "")
-    assert view.property("goals").property("text")
+    assert view.property("goals").property("status")
 
 
 @zenoh
@@ -300,7 +300,7 @@ def test_goal_without_navigation_is_refused_and_published_with_a_subscriber(
     view.setProperty("tool", "goal")
     hand.drag(3.0, 1.0, 3.0, 0.5)
     assert "no navigation action, and /goal_pose has no subscriber" in message(controls)
-    assert view.property("goals").property("bad")
+    assert view.property("goals").property("failed")
     got: list[Any] = []
     controls.robot.create_subscription("/goal_pose", "geometry_msgs/msg/PoseStamped", got.append)
     view.setProperty("tool", "goal")

@@ -61,7 +61,9 @@ def test_map_is_found_by_type_fitted_and_painted(
     cells[:, :5] = 100  # a wall in the west
     cells[:5, 30:] = -1
     robot.start(cells)
-    view = controls.show('MapView { anchors.fill: parent; colors: "map"; tools: false }', 640, 480)
+    view = controls.show(
+        'MapView { anchors.fill: parent; colorScheme: "map"; tools: false }', 640, 480
+    )
     wait(lambda: view.property("scene").layers and layer(view, "map").grid)
     wait(lambda: is_complete(view))
     wait(lambda: not view.property("stale"))
@@ -89,7 +91,7 @@ def test_updates_change_only_their_tiles(
 ) -> None:
     updates = controls.robot.create_publisher("/map_updates", "map_msgs/msg/OccupancyGridUpdate")
     robot.start(np.zeros((1100, 1100)))
-    view = controls.show('MapView { anchors.fill: parent; colors: "map" }')
+    view = controls.show('MapView { anchors.fill: parent; colorScheme: "map" }')
     wait(updates.subscription_count)
     wait(lambda: is_complete(view))
     tiles = layer(view, "map").grid.tiles
@@ -147,7 +149,7 @@ def test_scan_waits_for_its_transform_and_is_drawn(
 ) -> None:
     robot.start()
     laser = controls.robot.create_publisher("/scan", "sensor_msgs/msg/LaserScan")
-    view = controls.show('MapView { anchors.fill: parent; colors: "map"; tools: false }')
+    view = controls.show('MapView { anchors.fill: parent; colorScheme: "map"; tools: false }')
     wait(laser.subscription_count)
     scan = {
         "header": {"frame_id": "laser"},
@@ -213,7 +215,9 @@ def test_costmaps_paths_footprints_and_particles_are_found_and_drawn(
     node.create_publisher("/other_polygon", kind)
     cloud = node.create_publisher("/particle_cloud", "geometry_msgs/msg/PoseArray", QoS.latched())
     cloud.publish(header={"frame_id": "map"}, poses=[{"position": {"x": 1.0, "y": 2.0}}])
-    view = controls.show('MapView { anchors.fill: parent; colors: "map"; tools: false }', 640, 480)
+    view = controls.show(
+        'MapView { anchors.fill: parent; colorScheme: "map"; tools: false }', 640, 480
+    )
     scene = view.property("scene")
     wait(lambda: len(scene.layers) == 5)
     kinds = [(one.KIND, one.property("topic")) for one in scene.layers]

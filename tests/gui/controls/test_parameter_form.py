@@ -103,16 +103,16 @@ def test_refused_value_is_shown_with_the_reason(controls: Any, robot: Any, wait:
     assert shown(controls, "arm.count") == "3"
     write_row(controls, "arm.count", "many")
     wait(lambda: "'many' is not an integer" in detail.property("text"))
-    form.set("speed", 99)
+    form.setValue("speed", 99)
     wait(lambda: "REFUSED" in controls.find("detail", row(controls, "speed")).property("text"))
     assert robot.parameters.get("speed") == 1.5
 
 
 def test_changes_are_undone(controls: Any, robot: Any, wait: Any) -> None:
     form = show(controls, wait)
-    form.set("arm.count", 7)
+    form.setValue("arm.count", 7)
     wait(lambda: form.property("undoText") == "arm.count: 3")
-    form.set("speed", 1)
+    form.setValue("speed", 1)
     wait(lambda: form.property("undoText") == "speed: 1.5")
     click(controls, "undo")
     wait(lambda: robot.parameters.get("speed") == 1.5)
@@ -183,7 +183,7 @@ def test_parameters_over_a_real_middleware(live_controls: Any, url: str, wait: A
         'ParameterForm { nodeName: "/robot"; anchors.fill: parent }', 500, 500
     )
     wait(lambda: form.property("ready") and row_or_none(live_controls, "speed"))
-    form.set("speed", 1)
+    form.setValue("speed", 1)
     wait(lambda: robot.parameters.get("speed") == 1.0)
     write_row(live_controls, "label", "left")
     wait(lambda: robot.parameters.get("label") == "left")

@@ -47,7 +47,7 @@ def test_properties_have_types_units_ranges_and_choices() -> None:
     low = property_of("Battery", "low")
     assert (low.kind, low.default, low.low, low.high) == ("number", "0.3", 0, 1)
     assert property_of("CameraView", "timeout").unit == "ms"
-    assert property_of("CameraView", "turn").choices == ("0", "90", "180", "270")
+    assert property_of("CameraView", "imageRotation").choices == ("0", "90", "180", "270")
     assert property_of("Attitude", "convention").choices == ("ENU", "NED")
     assert property_of("Plot", "window").unit == "s"
     assert property_of("Plot", "leftLog").kind == "bool"

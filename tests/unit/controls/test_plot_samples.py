@@ -111,13 +111,13 @@ def test_runs_are_limited() -> None:
     for at in range(100):
         samples.add(np.array([(at % 2) * 100 * SECOND]), np.array([0.0]))
     assert len(samples.runs()) == MAX_RUNS
-    assert len(samples) + samples.forgotten == 100
+    assert len(samples) + samples.removed == 100
 
 
 def test_old_samples_are_dropped_in_blocks_and_counted() -> None:
     samples, times, _ = filled(4 * BLOCK_SIZE)
     samples.forget(int(times[2 * BLOCK_SIZE + 5]), 10**9)
-    assert samples.forgotten == 2 * BLOCK_SIZE
+    assert samples.removed == 2 * BLOCK_SIZE
     assert len(samples) == 2 * BLOCK_SIZE
     samples.forget(-1, BLOCK_SIZE)
     assert len(samples) == BLOCK_SIZE

@@ -40,7 +40,7 @@ class Alarms(QtCore.QObject):
     #: The DiagnosticsTopic whose parts raise alarms; null for none.
     reports = Writable(QtCore.QObject, read=lambda self: self._reports, write="_set_reports")
     #: From which level on a part raises one: "error" or "warning". A silent part always does.
-    level = Writable(str, "error", one_of("error", "warning"), then="_review")
+    minLevel = Writable(str, "error", one_of("error", "warning"), then="_review")
     rows = ReadOnly(QtCore.QObject, read=lambda self: self._model)
     #: Alarms that are not over, that are not acknowledged, and of both kinds together.
     active = ReadOnly(int, 0)
@@ -51,7 +51,7 @@ class Alarms(QtCore.QObject):
     #: Level of the worst alarm: 0 without one, 1 warning, 2 error, 3 silent.
     worst = ReadOnly(int, 0)
 
-    _level: str
+    _minLevel: str
     _omitted: int
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
@@ -91,7 +91,7 @@ class Alarms(QtCore.QObject):
         """Compare the alarms with the parts of the diagnostics."""
         reports = self._reports
         parts = reports.parts() if reports is not None and is_alive(reports) else []
-        least = RANK[WARN if self._level == "warning" else ERROR]
+        least = RANK[WARN if self._minLevel == "warning" else ERROR]
         present: set[Hashable] = set()
         raised: list[str] = []
         self._first = self._is_quiet()

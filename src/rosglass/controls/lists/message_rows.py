@@ -272,7 +272,7 @@ class MessageRows(LiveTopic):
         self._show_rows()
 
     @Slot(str, str, result=bool)
-    def setValue(self, key: str, text: str) -> bool:
+    def setText(self, key: str, text: str) -> bool:
         """Set a leaf of the edited message; if the text does not fit, `refusal` says why."""
         row = self._model.find(key)
         field = self._model.rows[row] if row >= 0 else None

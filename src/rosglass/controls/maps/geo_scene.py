@@ -54,7 +54,7 @@ class GeoScene(Element):
     tilesChanged = Signal()
 
     #: A folder of tiles or an MBTiles file; empty for none.
-    path = Writable(str, "")
+    tilesPath = Writable(str, "")
     #: Topics of geographic_msgs/GeoPath.
     paths = Writable(list, [])
     camera = Writable(QtCore.QObject, None, then="_on_camera")
@@ -65,11 +65,11 @@ class GeoScene(Element):
     hasTiles = ReadOnly(bool, False)
     attribution = ReadOnly(str, "")
     #: The position that is shown, in Mercator metres; and its accuracy in metres on the ground.
-    x = ReadOnly(float, 0.0, notify="moved")
-    y = ReadOnly(float, 0.0, notify="moved")
-    moved = Signal()
+    robotX = ReadOnly(float, 0.0, notify="robotMoved")
+    robotY = ReadOnly(float, 0.0, notify="robotMoved")
+    robotMoved = Signal()
     #: Whether there has been a position.
-    seen = ReadOnly(bool, False)
+    robotSeen = ReadOnly(bool, False)
     #: Radius of the circle that holds 95 % of the positions, in metres; NaN while unknown.
     accuracy = ReadOnly(float, math.nan)
     #: The problem of the tiles; empty without one.
@@ -98,7 +98,7 @@ class GeoScene(Element):
     # Tiles and layers.
 
     def _wanted(self) -> tuple[Any, ...] | None:
-        return (self.path,) if self.path else None
+        return (self.tilesPath,) if self.tilesPath else None
 
     def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
         path, executor = wanted[0], self._executor
@@ -203,9 +203,9 @@ class GeoScene(Element):
         known = math.isfinite(variance) and variance >= 0
         report(
             self,
-            x=x,
-            y=y,
-            seen=True,
+            robotX=x,
+            robotY=y,
+            robotSeen=True,
             accuracy=_SIGMAS_95 * math.sqrt(variance) if known else math.nan,
         )
         self.repaint.emit()

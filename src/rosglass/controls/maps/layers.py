@@ -77,8 +77,6 @@ class MapLayer(TopicElement):
     #: Whether it is received and drawn.
     shown = Writable(bool, True, then="_on_shown")
     age = ReadOnly(float, -1.0)
-    #: Its problem, in words; empty if nothing is.
-    status = ReadOnly(str, "")
 
     def __init__(self, scene: Any, topic: str) -> None:
         super().__init__(scene, scene._find_runtime())
@@ -87,7 +85,7 @@ class MapLayer(TopicElement):
         self._queue: MessageQueue | None = None
         self._arrived_at = self._late = 0.0
         #: Why the last message cannot be shown, is odd, or has no place.
-        self._error = self._warning = self._lost = ""
+        self._error = self._warning = self._lost = self._described = ""
         self.frame = ""
         self.pose: Plane | None = None
 
@@ -155,7 +153,9 @@ class MapLayer(TopicElement):
         self.frame, self.pose = "", None
         self._error = self._warning = self._lost = ""
         self._arrived_at = 0.0
-        report(self, age=-1.0, status="")
+        self._described = ""
+        if report(self, age=-1.0):
+            self._announce_problem()
 
     # Judging.
 
@@ -186,10 +186,15 @@ class MapLayer(TopicElement):
         if self._arrived_at:
             report(self, age=self._steady() - self._arrived_at)
         super()._update_stale()
-        report(self, status=self._describe())
+        self._described = self._describe()
+        if is_alive(self):
+            self._announce_problem()
+
+    def _get_problem(self) -> str:
+        return self._problem or self._described
 
     def _describe(self) -> str:
-        wrong = self._get_problem() or self._error or self._lost
+        wrong = self._problem or self._error or self._lost
         if wrong or not self.shown:
             return wrong
         endpoint = self._endpoint
@@ -274,7 +279,7 @@ class GridLayer(MapLayer):
         return self._own_reader.read
 
     def _colors_wanted(self) -> NDArray[np.uint8]:
-        scheme = self._scene.colors
+        scheme = self._scene.colorScheme
         if scheme != "theme":
             return grid_colors(scheme)
         # PySide's hints do not say what these tuples hold.

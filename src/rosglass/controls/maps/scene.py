@@ -87,7 +87,9 @@ class MapScene(Element):
     timeout = Writable(int, 1500, at_least(0), then="_on_tick", unit="ms")
     camera = Writable(QtCore.QObject, None, then="_on_camera")
     #: Colours of the map: ``theme``, ``map``, ``costmap`` or ``raw``.
-    colors = Writable(str, "theme", one_of("theme", "map", "costmap", "raw"), then="_on_colors")
+    colorScheme = Writable(
+        str, "theme", one_of("theme", "map", "costmap", "raw"), then="_on_colors"
+    )
     freeColor = Writable(QtGui.QColor, QtGui.QColor(255, 255, 255), then="_on_colors")
     occupiedColor = Writable(QtGui.QColor, QtGui.QColor(0, 0, 0), then="_on_colors")
 
@@ -108,8 +110,6 @@ class MapScene(Element):
     #: Whether nothing of what is shown is up to date.
     stale = ReadOnly(bool, True)
     age = ReadOnly(float, -1.0)
-    #: The problems of the layers and the robot, in words.
-    status = ReadOnly(str, "")
     #: How many topics by type are not shown.
     more = ReadOnly(int, 0)
     #: The servers' names and types, by what they do: ``goal``, ``waypoints``; empty without one.
@@ -124,7 +124,8 @@ class MapScene(Element):
         super().__init__(parent)
         self._layers: dict[tuple[str, str], MapLayer] = {}
         self._link: TfLink | None = None
-        self._lost = ""
+        #: Why the robot has no position; what is wrong with the layers and the robot.
+        self._lost = self._wrong = ""
         self.worker = Dispatcher("rosglass map")
         self._images: TileImages | None = None
         self.track = Track(_TRACK_STEP_M, _JUMP_M)
@@ -407,6 +408,9 @@ class MapScene(Element):
 
     # Judging.
 
+    def _get_problem(self) -> str:
+        return super()._get_problem() or self._wrong
+
     @Slot()
     def _on_tick(self) -> None:
         if self.robotSeen:
@@ -418,7 +422,7 @@ class MapScene(Element):
     def _judge(self) -> None:
         shown = [layer for layer in self._layers.values() if layer.shown]
         fresh = [layer for layer in shown if not layer.stale]
-        wrong = [f"{layer.topic}: {layer.status}" for layer in shown if layer.status]
+        wrong = [f"{layer.topic}: {layer.problem}" for layer in shown if layer.problem]
         disconnected = self._disconnected()
         if disconnected:
             wrong = [disconnected]
@@ -428,14 +432,15 @@ class MapScene(Element):
             wrong.insert(0, self._describe_robot())
         elif self._lost and any(layer.age >= 0 for layer in shown):
             wrong.append(f"no robot: {self._lost}")
+        self._wrong = "; ".join(wrong)[:1000]
         ages = [layer.age for layer in shown if layer.age >= 0]
-        report(
+        if report(
             self,
             hasMap=any(layer.KIND == "map" and layer.pose is not None for layer in shown),
             stale=not fresh or (self.robotSeen and not self.robotKnown) or bool(disconnected),
             age=min(ages, default=-1.0),
-            status="; ".join(wrong)[:1000],
-        )
+        ):
+            self._announce_problem()
 
     def _describe_robot(self) -> str:
         if self._lost:

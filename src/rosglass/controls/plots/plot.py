@@ -138,7 +138,8 @@ class _Mark(NamedTuple):
 class PlotData(Element):
     """The samples, the visible time and the axes of a ``Plot``. See ``docs/controls``."""
 
-    saved = Signal(str, str, arguments=["file", "problem"])
+    saved = Signal(str, arguments=["file"])
+    saveFailed = Signal(str, arguments=["reason"])
     structureChanged = Signal()
     readingsChanged = Signal()
     axesChanged = Signal()
@@ -166,7 +167,7 @@ class PlotData(Element):
     age = ReadOnly(float, -1.0)
     received = ReadOnly(float, 0.0)
     lost = ReadOnly(float, 0.0)
-    forgotten = ReadOnly(float, 0.0)
+    removed = ReadOnly(float, 0.0)
     #: Time at the right end, in seconds of the stamps' clock.
     end = ReadOnly(float, read=lambda self: self._end_ns / 1e9, notify="viewChanged")
     #: Seconds from the right end to the newest time.
@@ -509,11 +510,11 @@ class PlotData(Element):
     # -- for QML ---------------------------------------------------------------------------------
 
     @Slot(float, float)
-    def zoom(self, factor: float, at: float) -> None:
-        """Show `factor` times the time, and keep the time at the share `at` of the width."""
+    def zoomBy(self, factor: float, at: float) -> None:
+        """Enlarge the time, and keep the one at the share `at` of the width."""
         if not (0 < factor < math.inf and math.isfinite(at)):
             return
-        window = min(max(self._window * factor, _MIN_WINDOW_S), _MAX_WINDOW_S)
+        window = min(max(self._window / factor, _MIN_WINDOW_S), _MAX_WINDOW_S)
         if self._paused:
             self._end_ns += round((window - self._window) * (1 - at) * 1e9)
         self.window = window
@@ -548,14 +549,14 @@ class PlotData(Element):
             self._on_view()
 
     @Slot(float, float)
-    def zoomValues(self, factor: float, at: float) -> None:
-        """Show `factor` times the values of both axes around the share `at` of the height."""
+    def zoomValuesBy(self, factor: float, at: float) -> None:
+        """Enlarge the values of both axes around the share `at` of the height."""
         if not (0 < factor < math.inf and math.isfinite(at)):
             return
         for axis, names in zip(
             self._frame.axes, (("leftMin", "leftMax"), ("rightMin", "rightMax")), strict=True
         ):
-            low, high = (axis.value(at + (end - at) * factor) for end in (0.0, 1.0))
+            low, high = (axis.value(at + (end - at) / factor) for end in (0.0, 1.0))
             if low < high:
                 setattr(self, names[0], low)
                 setattr(self, names[1], high)
@@ -602,7 +603,7 @@ class PlotData(Element):
 
     @Slot(str)
     def saveCsv(self, file: str) -> None:
-        """Write all samples to a file in the background; ``saved`` reports the end."""
+        """Write all samples to a file in the background; a signal reports the end."""
         url = QtCore.QUrl(file)
         path = url.toLocalFile() if url.isLocalFile() else file
         # A view on the present samples; what arrives while they are written is not among them.
@@ -614,7 +615,9 @@ class PlotData(Element):
         marks = list(self._marks)
         session = self._session
         if session is None or not path:
-            self.saved.emit(path, "there is no file name" if not path else "there is no robot yet")
+            self.saveFailed.emit(
+                "there is no file name" if not path else f"{path}: there is no robot yet"
+            )
             return
 
         executor, done = session.executor, weak_callback(self._on_saved)
@@ -631,8 +634,10 @@ class PlotData(Element):
         threading.Thread(target=write, name="plot to CSV", daemon=True).start()
 
     def _on_saved(self, path: str, problem: str) -> None:
-        if is_alive(self):
-            self.saved.emit(path, problem)
+        if is_alive(self) and problem:
+            self.saveFailed.emit(problem)
+        elif is_alive(self):
+            self.saved.emit(path)
 
     # -- what is wrong ---------------------------------------------------------------------------
 
@@ -720,10 +725,8 @@ class PlotData(Element):
             received += feed.received
             malformed += feed.malformed
             lost += feed.lost
-        forgotten = sum(line.samples.forgotten for line in self._lines if line.samples is not None)
-        report(
-            self, received=float(received), lost=float(lost + malformed), forgotten=float(forgotten)
-        )
+        removed = sum(line.samples.removed for line in self._lines if line.samples is not None)
+        report(self, received=float(received), lost=float(lost + malformed), removed=float(removed))
 
 
 def _lines_of(entry: _Entry) -> Iterable[_Line]:

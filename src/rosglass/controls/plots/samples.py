@@ -273,7 +273,7 @@ class Samples:
     more than 2 s, a new run begins: the newest run is shown, all that are kept are exported.
 
     Attributes:
-        forgotten: Samples that were dropped as they were older than the history.
+        removed: Samples that were dropped as they were older than the history.
         restarts: How often time went back.
     """
 
@@ -282,7 +282,7 @@ class Samples:
         self._runs: deque[_Run] = deque()
         self._changed_from = _MAX_TIME
         self._pauses: deque[int] = deque(maxlen=_RECENT_PAUSES)
-        self.forgotten = self.restarts = 0
+        self.removed = self.restarts = 0
 
     def __len__(self) -> int:
         with self._lock:
@@ -338,7 +338,7 @@ class Samples:
             self._runs.clear()
             self._pauses.clear()
             self._changed_from = -_MAX_TIME
-            self.forgotten = self.restarts = 0
+            self.removed = self.restarts = 0
 
     def forget(self, before: int, most: int) -> None:
         """Drop old samples, in blocks, and count them.
@@ -350,12 +350,12 @@ class Samples:
         with self._lock:
             if not self._runs:
                 return
-            self.forgotten += self._runs[-1].drop_before(before)
+            self.removed += self._runs[-1].drop_before(before)
             count = len(self)
             while count > most and (len(self._runs) > 1 or len(self._runs[0].blocks) > 1):
                 run = self._runs[0]
                 count -= run.blocks[0].count
-                self.forgotten += run.blocks.pop(0).count
+                self.removed += run.blocks.pop(0).count
                 if not run.blocks:
                     self._runs.popleft()
 
@@ -425,7 +425,7 @@ class Samples:
         self.restarts += 1
         self._runs.append(_Run())
         while len(self._runs) > MAX_RUNS:
-            self.forgotten += self._runs.popleft().count
+            self.removed += self._runs.popleft().count
         self._pauses.clear()
         self._changed_from = -_MAX_TIME
 

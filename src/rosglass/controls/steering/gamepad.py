@@ -183,8 +183,8 @@ class Gamepad(Element):
     deadMan = Writable(str, "leftshoulder", then="_judge")
     turbo = Writable(str, "rightshoulder", then="_judge")
     #: Share of the highest speed without turbo, and with it.
-    speed = Writable(float, 0.5, within(0, 1), then="_judge")
-    turboSpeed = Writable(float, 1.0, within(0, 1), then="_judge")
+    speedShare = Writable(float, 0.5, within(0, 1), then="_judge")
+    turboShare = Writable(float, 1.0, within(0, 1), then="_judge")
     stopButton = Writable(str, "", then="_judge")
 
     devices = ReadOnly(list, [])
@@ -425,7 +425,7 @@ class Gamepad(Element):
 
     def _steer(self, pad: Pad) -> str:
         """Steer or let go; return why what is held does not count, empty if it does."""
-        share = self.turboSpeed if self._is_down(pad, self.turbo) else self.speed
+        share = self.turboShare if self._is_down(pad, self.turbo) else self.speedShare
         names = (self.forward, self.left, self.sideways)
         wanted = [share * self._axis(pad, name) for name in names]
         is_held = self._is_down(pad, self.deadMan) if self.deadMan else any(wanted)

@@ -82,7 +82,7 @@ class TopicRecorder(Element):
     elapsed = ReadOnly(float, 0.0)
     size = ReadOnly(float, 0.0)
     messageCount = ReadOnly(int, 0)
-    dropped = ReadOnly(int, 0)
+    lost = ReadOnly(int, 0)
     markCount = ReadOnly(int, 0)
     topicCount = ReadOnly(int, 0)
     #: Why topics are not recorded, such as ``/scan: no publisher``.
@@ -144,7 +144,7 @@ class TopicRecorder(Element):
             elapsed=0.0,
             size=0.0,
             messageCount=0,
-            dropped=0,
+            lost=0,
             markCount=0,
             topicCount=0,
             missing="",
@@ -277,7 +277,7 @@ class TopicRecorder(Element):
             elapsed=round(status.duration, 1),
             size=float(status.size),
             messageCount=status.messages,
-            dropped=status.dropped,
+            lost=status.dropped,
             markCount=status.marks,
             topicCount=len(status.topics),
             missing="; ".join(missing)[:2000],

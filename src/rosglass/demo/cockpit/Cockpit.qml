@@ -73,7 +73,7 @@ Item {
         id: camera; objectName: "camera"; x: Theme.gap; y: bar.height + Theme.gap
         width: cockpit.cameraWidth; height: cockpit.cameraTall
         topic: "/camera/image_raw"; title: "front camera"; transport: "raw"
-        reason: link.reason
+        problem: link.reason
         tools: false
         // The figures of `rosglass demo` are read from the pixels of the image.
         fullResolution: true

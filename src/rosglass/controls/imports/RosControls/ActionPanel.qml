@@ -35,11 +35,11 @@ LiveFrame {
 
     // Whether a server is available, and whether a goal is under way.
     readonly property bool ready: client_ !== null && client_.ready
-    readonly property bool active: handle_ !== null
+    readonly property bool busy: handle_ !== null
     // "", "sent", "running", "canceling", "succeeded", "canceled", "refused", "aborted" or "unknown".
     readonly property string outcome: outcome_
     // What is shown of the goal.
-    readonly property string state_: active && !ready ? qsTr("NO CONTACT: it may still be running")
+    readonly property string state_: busy && !ready ? qsTr("NO CONTACT: it may still be running")
         : outcome_ === "" ? (ready ? qsTr("ready") : "")
         : outcome_ === "sent" ? qsTr("sent, not accepted yet")
         : outcome_ === "running" ? (stale ? qsTr("it may still be running") : qsTr("running"))
@@ -83,7 +83,7 @@ LiveFrame {
     property string formType_
     property string formProblem_
     readonly property bool form_: (goal === undefined || goal === null) && !goals.length
-    readonly property bool sendable_: ready && !active && obstacle === ""
+    readonly property bool sendable_: ready && !busy && obstacle === ""
     // The text of the goal's button.
     property string chosen_
     readonly property string of_: chosen_ && outcome_ !== "" ? qsTr("%1: ").arg(chosen_) : ""
@@ -95,7 +95,7 @@ LiveFrame {
         : obstacle ? obstacle
         : !ready ? qsTr("NOT AVAILABLE: %1").arg(client_ && client_.problem ? Fields.bounded(client_.problem, 120) : qsTr("no server of %1 yet").arg(name_))
         : ""
-    note: active ? qsTr("%1 s").arg(elapsed.toFixed(0)) : ""
+    note: busy ? qsTr("%1 s").arg(elapsed.toFixed(0)) : ""
     contentWidth: 240 * Theme.size
     contentHeight: column.implicitHeight
     Accessible.description: status || state_ + " " + said_
@@ -310,7 +310,7 @@ LiveFrame {
     Timer {
         interval: 200
         repeat: true
-        running: panel.active
+        running: panel.busy
         // They grow even when the clock is set back.
         onTriggered: {
             panel.elapsed_ = Math.max(panel.elapsed_, (Date.now() - panel.sentAt_) / 1000)
@@ -347,7 +347,7 @@ LiveFrame {
                         objectName: "field_" + modelData.path
                         anchors { left: parent.horizontalCenter; right: parent.right }
                         visible: modelData.kind !== "bool"
-                        enabled: !panel.active
+                        enabled: !panel.busy
                         text: modelData.text
                         maximumLength: 10000
                         Accessible.name: modelData.path
@@ -358,7 +358,7 @@ LiveFrame {
                         objectName: "switch_" + modelData.path
                         anchors { left: parent.horizontalCenter }
                         visible: modelData.kind === "bool"
-                        enabled: !panel.active
+                        enabled: !panel.busy
                         checked: modelData.text === "true"
                         Accessible.name: modelData.path
                         onToggled: panel.entries_[index].text = String(checked)
@@ -421,7 +421,7 @@ LiveFrame {
                     width: parent.half
                     text: qsTr("Cancel")
                     tint: Theme.bad
-                    enabled: panel.active
+                    enabled: panel.busy
                     onClicked: panel.cancel()
                 }
             }
@@ -430,7 +430,7 @@ LiveFrame {
                 height: Theme.gap
                 radius: height / 2
                 color: Theme.track
-                visible: panel.active || !isNaN(panel.progress)
+                visible: panel.busy || !isNaN(panel.progress)
                 Accessible.role: Accessible.ProgressBar
                 Accessible.name: qsTr("Progress")
                 Accessible.description: isNaN(panel.progress) ? qsTr("unknown") : qsTr("%1 %").arg((100 * panel.progress).toFixed(0))
@@ -450,13 +450,13 @@ LiveFrame {
                     if (panel.cancelProblem_ || panel.formProblem_)
                         return panel.cancelProblem_ || panel.formProblem_
                     const parts = [panel.of_ + panel.state_]
-                    if (panel.active && panel.ready && !isNaN(panel.progress))
+                    if (panel.busy && panel.ready && !isNaN(panel.progress))
                         parts.push(qsTr("%1 %").arg((100 * panel.progress).toFixed(0)))
-                    if (panel.active && panel.feedback !== undefined && panel.silence_ > 3)
+                    if (panel.busy && panel.feedback !== undefined && panel.silence_ > 3)
                         parts.push(qsTr("last feedback %1 s ago").arg(panel.silence_.toFixed(0)))
                     return parts.filter(part => part !== "").join(", ")
                 }
-                color: panel.cancelProblem_ || panel.formProblem_ || (panel.active && !panel.ready) ? Theme.bad
+                color: panel.cancelProblem_ || panel.formProblem_ || (panel.busy && !panel.ready) ? Theme.bad
                     : panel.outcome === "succeeded" ? Theme.good
                     : panel.outcome === "refused" || panel.outcome === "aborted" || panel.outcome === "unknown" ? Theme.bad
                     : panel.outcome === "canceled" || panel.outcome === "canceling" ? Theme.warn : Theme.dim

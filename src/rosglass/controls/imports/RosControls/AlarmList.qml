@@ -13,7 +13,7 @@ LiveFrame {
     // Whether diagnostics raise alarms.
     property bool diagnostics: true
     // From which level on a part raises one: "error" or "warning". A silent part always does.
-    property alias level: alarms.level
+    property alias minLevel: alarms.minLevel
     // Topics of std_msgs/Bool: names, or objects such as { topic: "/estop", text: "Emergency stop",
     // when: true, level: "error" }.
     property var topics: []

@@ -26,11 +26,11 @@ FocusScope {
     // Milliseconds from the robot's stamp to here beyond which an image is late, or the clocks too far apart to know.
     property real maxLatency: 1000
     // Why images may be missing altogether, such as a lost connection; shown with what is known here.
-    property string reason
+    property string problem
     // "fit", "crop" or "stretch".
     property string fillMode: "fit"
     // Degrees clockwise: 0, 90, 180 or 270.
-    property int turn: 0
+    property int imageRotation: 0
     // Images per second at most; 0 for all.
     property alias maxRate: camera.throttleRate
     // Whether images are decoded in full, not in the size in which they are shown.
@@ -124,7 +124,7 @@ FocusScope {
     // Shows the whole image, then its middle filling the item, then all of it stretched.
     function nextFillMode() { fillMode = fillMode === "fit" ? "crop" : fillMode === "crop" ? "stretch" : "fit" }
     // Turns the image by 90 degrees clockwise.
-    function rotateImage() { turn = (turn + 90) % 360 }
+    function rotateImage() { imageRotation = (imageRotation + 90) % 360 }
 
     implicitWidth: 320 * Theme.size
     implicitHeight: 180 * Theme.size
@@ -148,7 +148,7 @@ FocusScope {
         enabled: view.active
         // The last image stays, so that the operator can see where the robot was; the frame says that it is old.
         timeout: 0
-        rotation: [0, 90, 180, 270].indexOf(view.turn) >= 0 ? view.turn : 0
+        rotation: [0, 90, 180, 270].indexOf(view.imageRotation) >= 0 ? view.imageRotation : 0
         onImageShown: view.imageShown()
         onSnapshotSaved: function(path) {
             view.file_ = path
@@ -277,7 +277,7 @@ FocusScope {
                     width: Math.min(implicitWidth, banner.most)
                     visible: text !== "" && view.height > 120 * Theme.size
                     text: view.late ? qsTr("or the clocks of robot and operator differ by that much")
-                        : Fields.bounded(view.reason || (view.received && view.unconnected_) || camera.problem)
+                        : Fields.bounded(view.problem || (view.received && view.unconnected_) || camera.problem)
                     color: Theme.dim
                     wrapMode: Text.Wrap
                     maximumLineCount: 6

@@ -74,10 +74,10 @@ LiveFrame {
         scene_.setPosition(message.latitude, message.longitude, known ? matrix[0] : NaN, known ? matrix[4] : NaN, known ? matrix[1] : NaN)
         if (!placed_) {
             placed_ = true
-            camera_.scale = Math.min(plane.width, plane.height) / (200 * scene_.stretch(scene_.y))
+            camera_.scale = Math.min(plane.width, plane.height) / (200 * scene_.stretch(scene_.robotY))
         }
         if (follow)
-            camera_.lookAt(scene_.x, scene_.y)
+            camera_.lookAt(scene_.robotX, scene_.robotY)
     }
     function path_(source) {
         const text = decodeURIComponent(String(source))
@@ -87,7 +87,7 @@ LiveFrame {
     title: qsTr("Position")
     source: live
     problem: live.problem ? live.problem
-        : message && !fixed_ ? (scene_.seen ? qsTr("%1: the last position is shown").arg(fix) : fix)
+        : message && !fixed_ ? (scene_.robotSeen ? qsTr("%1: the last position is shown").arg(fix) : fix)
         : network_ ? qsTr("%1 is not read: tiles come from a folder or an MBTiles file").arg(Fields.bounded(path_(tiles), 100))
         : scene_.tilesProblem
     note: fixed_ && isFinite(accuracy) ? qsTr("± %1 m").arg(accuracy < 10 ? accuracy.toFixed(2) : accuracy.toFixed(0)) : ""
@@ -115,7 +115,7 @@ LiveFrame {
     }
     GeoScene {
         id: scene_
-        path: view.network_ ? "" : view.path_(view.tiles)
+        tilesPath: view.network_ ? "" : view.path_(view.tiles)
         paths: view.paths
         camera: camera_
     }
@@ -146,7 +146,7 @@ LiveFrame {
         }
         Rectangle {
             objectName: "circle"
-            readonly property real pixels: 2 * scene_.accuracy * scene_.stretch(scene_.y) * camera_.scale
+            readonly property real pixels: 2 * scene_.accuracy * scene_.stretch(scene_.robotY) * camera_.scale
             visible: mark.visible && pixels > 4 && pixels < 20000
             width: visible ? pixels : 0
             height: width
@@ -167,16 +167,16 @@ LiveFrame {
             id: mark
             objectName: "mark"
             camera: camera_
-            visible: scene_.seen
+            visible: scene_.robotSeen
             isDot: isNaN(view.heading)
-            pose: ({ x: scene_.x, y: scene_.y, yaw: isNaN(view.heading) ? 0 : Math.PI / 2 - view.heading * Math.PI / 180 })
+            pose: ({ x: scene_.robotX, y: scene_.robotY, yaw: isNaN(view.heading) ? 0 : Math.PI / 2 - view.heading * Math.PI / 180 })
             color: view.fixed_ && !view.stale ? Theme.warn : Theme.bad
         }
     }
     ThemeText {
         anchors { left: parent.left; bottom: parent.bottom; margins: Theme.gap / 2 }
         width: Math.min(implicitWidth, parent.width / 2)
-        text: plane.hovered ? scene_.describe(plane.at.x, plane.at.y) : scene_.seen ? scene_.describe(scene_.x, scene_.y) : ""
+        text: plane.hovered ? scene_.describe(plane.at.x, plane.at.y) : scene_.robotSeen ? scene_.describe(scene_.robotX, scene_.robotY) : ""
         color: Theme.text
         font.pixelSize: Theme.small
         style: Text.Outline

@@ -19,7 +19,7 @@ QtObject {
     // "", "goal" or "waypoints": what the robot is driving to.
     property string active: ""
     // Whether the server has been asked to cancel.
-    property bool cancelling: false
+    property bool canceling: false
     // {x, y, yaw} in metres and radians: the goals that are driven to.
     property var poses: []
     // The number of waypoints that are behind the robot.
@@ -27,8 +27,8 @@ QtObject {
     // Metres left to drive; NaN while unknown.
     property real distance: NaN
     // What became of the last goal, in words; whether that is bad.
-    property string text: ""
-    property bool bad: false
+    property string status: ""
+    property bool failed: false
 
     property var handle_: null
     property var publishers_: ({})
@@ -52,8 +52,8 @@ QtObject {
         return publishers_[name]
     }
     function refuse_(why) {
-        text = Fields.bounded(why)
-        bad = true
+        status = Fields.bounded(why)
+        failed = true
         return false
     }
     function usable_(list) {
@@ -107,8 +107,8 @@ QtObject {
         const publisher = publisher_(poseTopic, "geometry_msgs/msg/PoseWithCovarianceStamped")
         const sent = publisher.publish({ header: { frame_id: scene.fixedFrame },
                                          pose: { pose: pose_(pose), covariance: covariance } })
-        text = sent ? qsTr("the pose was sent to %1").arg(scene.absolute(Fields.resolve(ns, poseTopic))) : qsTr("the pose was not sent: %1").arg(publisher.problem || qsTr("no connection"))
-        bad = !sent
+        status = sent ? qsTr("the pose was sent to %1").arg(scene.absolute(Fields.resolve(ns, poseTopic))) : qsTr("the pose was not sent: %1").arg(publisher.problem || qsTr("no connection"))
+        failed = !sent
         return sent
     }
     function publishGoal_(pose) {
@@ -119,8 +119,8 @@ QtObject {
         if (!publisher.publish(stamped_(pose)))
             return refuse_(qsTr("not sent: %1").arg(publisher.problem || qsTr("no connection")))
         poses = [pose]
-        text = qsTr("the goal was sent to %1, which reports nothing back").arg(name)
-        bad = false
+        status = qsTr("the goal was sent to %1, which reports nothing back").arg(name)
+        failed = false
         return true
     }
     function start_(what, action, type, goal, list) {
@@ -131,8 +131,8 @@ QtObject {
         const number = ++number_
         const isCurrent = () => number === goals.number_
         const client = Ros2.createActionClient(action, type)
-        text = qsTr("sending …")
-        bad = cancelling = accepted_ = false
+        status = qsTr("sending …")
+        failed = canceling = accepted_ = false
         distance = NaN
         reached = 0
         poses = list
@@ -145,7 +145,7 @@ QtObject {
                         return
                     goals.accepted_ = !!handle
                     if (handle)
-                        goals.text = qsTr("accepted")
+                        goals.status = qsTr("accepted")
                 },
                 onFeedback: function(handle, feedback) {
                     if (isCurrent())
@@ -158,7 +158,7 @@ QtObject {
             })
             handle_.cancelFailed.connect(function(reason) {
                 if (isCurrent()) {
-                    goals.cancelling = false
+                    goals.canceling = false
                     goals.refuse_(qsTr("not cancelled: %1").arg(reason))
                     goals.reading_.restart()
                 }
@@ -182,29 +182,29 @@ QtObject {
             reached = feedback.current_waypoint
         if (/NavigateThroughPoses/.test(type))
             reached = Math.max(0, poses.length - feedback.number_of_poses_remaining)
-        if (cancelling || reading_.running)
+        if (canceling || reading_.running)
             return
         const parts = []
         if (active === "waypoints")
             parts.push(qsTr("waypoint %1 of %2").arg(Math.min(reached + 1, poses.length)).arg(poses.length))
         parts.push(isFinite(distance) ? qsTr("%1 m left").arg(distance.toFixed(1)) : qsTr("driving"))
-        text = parts.join(", ")
-        bad = false
+        status = parts.join(", ")
+        failed = false
     }
     function end_(result) {
         const has = name => result.result && Object.keys(result.result).indexOf(name) >= 0
         const missed = has("missed_waypoints") ? result.result.missed_waypoints.length : 0
         const reason = result.reason || (has("error_msg") ? result.result.error_msg : "")
-        text = result.code === ActionGoalStatus.Succeeded && missed ? qsTr("reached, without %1 of the waypoints").arg(missed)
+        status = result.code === ActionGoalStatus.Succeeded && missed ? qsTr("reached, without %1 of the waypoints").arg(missed)
              : result.code === ActionGoalStatus.Succeeded ? qsTr("reached")
              : result.code === ActionGoalStatus.Canceled ? qsTr("cancelled")
              : result.code === ActionGoalStatus.Aborted && !accepted_ ? qsTr("refused: %1").arg(reason)
              : result.code === ActionGoalStatus.Aborted ? (reason ? qsTr("not reached: %1").arg(reason) : qsTr("not reached"))
              : qsTr("outcome unknown: %1").arg(reason)
-        text = Fields.bounded(text)
-        bad = result.code !== ActionGoalStatus.Succeeded && result.code !== ActionGoalStatus.Canceled || missed > 0
+        status = Fields.bounded(status)
+        failed = result.code !== ActionGoalStatus.Succeeded && result.code !== ActionGoalStatus.Canceled || missed > 0
         active = ""
-        cancelling = false
+        canceling = false
         handle_ = null
         poses = []
         distance = NaN
@@ -212,10 +212,10 @@ QtObject {
     // Follow the goal no longer: it is another robot's.
     function leave_() {
         ++number_
-        text = active ? qsTr("the goal of the other robot goes on") : ""
-        bad = active !== ""
+        status = active ? qsTr("the goal of the other robot goes on") : ""
+        failed = active !== ""
         active = ""
-        cancelling = false
+        canceling = false
         handle_ = null
         poses = []
         distance = NaN
@@ -224,8 +224,8 @@ QtObject {
     function cancel() {
         if (!active || !handle_)
             return false
-        cancelling = true
-        text = qsTr("cancelling …")
+        canceling = true
+        status = qsTr("cancelling …")
         handle_.cancel()
         return true
     }

@@ -22,7 +22,7 @@ LiveFrame {
     // Namespace of the topics tf and tf_static, where they are not global.
     property string tfNs
     // Colours of the map: "theme", "map" as in RViz, "costmap", "raw".
-    property string colors: "theme"
+    property string colorScheme: "theme"
     // Whether the robot stays in the middle.
     property bool follow: false
     // Whether the robot is seen heading up.
@@ -108,7 +108,7 @@ LiveFrame {
     title: qsTr("Map")
     stale: scene_.stale
     age: scene_.age
-    problem: scene_.problem || scene_.status
+    problem: scene_.problem
     note: scene_.robotSeen && track ? qsTr("%1 m driven").arg(scene_.driven.toFixed(1)) : ""
     contentWidth: 320 * Theme.size
     contentHeight: 240 * Theme.size
@@ -124,8 +124,8 @@ LiveFrame {
         if (tool) {
             // What became of the last goal has been read.
             if (!goals_.active) {
-                goals_.text = ""
-                goals_.bad = false
+                goals_.status = ""
+                goals_.failed = false
             }
             goals_.prepare(tool)
         }
@@ -152,7 +152,7 @@ LiveFrame {
         robotFrame: view.robotFrame
         tfNs: view.tfNs
         camera: camera_
-        colors: view.colors
+        colorScheme: view.colorScheme
         freeColor: Theme.mapFree
         occupiedColor: Theme.mapOccupied
         onRobotMoved: view.lookAtRobot_()
@@ -179,7 +179,7 @@ LiveFrame {
         onClicked: function(x, y) {
             // What became of a goal has been read.
             if (!goals_.active)
-                goals_.text = ""
+                goals_.status = ""
             view.clicked(x, y)
         }
         onHomeKey: view.fit()
@@ -293,7 +293,7 @@ LiveFrame {
             visible: goals_.active !== ""
             text: qsTr("Cancel goal")
             tint: Theme.bad
-            enabled: !goals_.cancelling
+            enabled: !goals_.canceling
             onClicked: goals_.cancel()
         }
     }
@@ -310,12 +310,12 @@ LiveFrame {
             objectName: "message"
             anchors.centerIn: parent
             width: Math.min(implicitWidth, plane.width - 2 * Theme.gap)
-            text: view.tool && goals_.bad ? goals_.text
+            text: view.tool && goals_.failed ? goals_.status
                 : view.tool === "goal" ? qsTr("press at the goal, drag to its heading")
                 : view.tool === "pose" ? qsTr("press where the robot is, drag to its heading")
                 : view.tool === "waypoints" ? qsTr("press and drag for each waypoint")
-                : goals_.text ? qsTr("Goal: %1").arg(goals_.text) : ""
-            color: goals_.bad ? Theme.bad : Theme.text
+                : goals_.status ? qsTr("Goal: %1").arg(goals_.status) : ""
+            color: goals_.failed ? Theme.bad : Theme.text
             font.pixelSize: Theme.small
         }
     }
@@ -345,7 +345,7 @@ LiveFrame {
                 ThemeText {
                     width: parent.width
                     visible: text !== ""
-                    text: modelData.shown ? modelData.status : ""
+                    text: modelData.shown ? modelData.problem : ""
                     color: modelData.stale ? Theme.bad : Theme.warn
                     font.pixelSize: Theme.small
                     wrapMode: Text.Wrap

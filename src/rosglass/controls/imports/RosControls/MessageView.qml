@@ -178,7 +178,7 @@ LiveFrame {
                         selectAll()
                     }
                     onAccepted: {
-                        if (messages.setValue(row.key, text)) {
+                        if (messages.setText(row.key, text)) {
                             view.editingKey_ = ""
                             tree.forceActiveFocus()
                         }

@@ -33,7 +33,7 @@ LiveFrame {
     signal rejected(string name, string reason)
 
     // Asks the node to set a parameter.
-    function set(name, value) { parameters.setValue(name, value) }
+    function setValue(name, value) { parameters.setValue(name, value) }
     // Reverts the last change that was made here.
     function undo() { parameters.undo() }
 

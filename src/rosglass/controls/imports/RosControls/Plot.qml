@@ -36,13 +36,14 @@ LiveFrame {
     property bool tools: true
     // Place of the cursor from 0 to 1; negative for none.
     property real cursor: -1
-    // Messages received, lost on their way or unreadable; samples older than the history.
+    // Messages received; lost on their way or unreadable; samples removed as older than the history.
     readonly property real received: plotted.received
     readonly property real lost: plotted.lost
-    readonly property real forgotten: plotted.forgotten
+    readonly property real removed: plotted.removed
 
-    // A file was written, or why it was not.
-    signal saved(string file, string problem)
+    // A file was written; why it was not.
+    signal saved(string file)
+    signal saveFailed(string reason)
 
     // Plot a path as well; stop plotting it.
     function add(path) {
@@ -51,18 +52,20 @@ LiveFrame {
     }
     function remove(path) { paths = paths.filter(function(one) { return one !== path }) }
     function mark(text) { plotted.mark(text) }
-    function zoom(factor, at) { plotted.zoom(factor, at === undefined ? 1 : at) }
+    function zoomBy(factor, at) { plotted.zoomBy(factor, at === undefined ? 1 : at) }
     function scroll(seconds) { plotted.scroll(seconds) }
     function fit() { plotted.fit() }
-    function live() { paused = false }
     function saveCsv(file) { plotted.saveCsv(file) }
     function savePng(file) {
         const local = String(file).replace(/^file:\/\//, "")
         const begun = plot.grabToImage(function(result) {
-            plot.saved(local, result.saveToFile(local) ? "" : qsTr("%1 could not be written").arg(local))
+            if (result.saveToFile(local))
+                plot.saved(local)
+            else
+                plot.saveFailed(qsTr("%1 could not be written").arg(local))
         })
         if (!begun)
-            plot.saved(local, qsTr("%1: the plot is not on the screen").arg(local))
+            plot.saveFailed(qsTr("%1: the plot is not on the screen").arg(local))
     }
 
     function save_(ending) {
@@ -78,14 +81,14 @@ LiveFrame {
         } else if (event.key === Qt.Key_Left || event.key === Qt.Key_Right) {
             plotted.scroll((event.key === Qt.Key_Left ? -0.1 : 0.1) * plotted.window)
         } else if (event.key === Qt.Key_Plus || event.key === Qt.Key_Minus || event.key === Qt.Key_Equal) {
-            const factor = event.key === Qt.Key_Minus ? 1.25 : 0.8
-            control ? plotted.zoomValues(factor, 0.5) : plotted.zoom(factor, cursor < 0 ? 1 : cursor)
+            const factor = event.key === Qt.Key_Minus ? 0.8 : 1.25
+            control ? plotted.zoomValuesBy(factor, 0.5) : plotted.zoomBy(factor, cursor < 0 ? 1 : cursor)
         } else if (event.key === Qt.Key_Space) {
             paused = !paused
         } else if (event.key === Qt.Key_Home) {
             plotted.toOldest()
         } else if (event.key === Qt.Key_End) {
-            live()
+            paused = false
         } else if (event.key === Qt.Key_0) {
             fit()
         } else if (event.key === Qt.Key_Escape && cursor >= 0) {
@@ -115,7 +118,8 @@ LiveFrame {
             return found
         }
         colors: Theme.series
-        onSaved: function(file, problem) { plot.saved(file, problem) }
+        onSaved: function(file) { plot.saved(file) }
+        onSaveFailed: function(reason) { plot.saveFailed(reason) }
     }
 
     Flow {
@@ -198,8 +202,8 @@ LiveFrame {
         visible: plot.tools
         width: visible ? implicitWidth : 0
         PlotButton_ { objectName: "pause"; text: plot.paused ? qsTr("Live") : qsTr("Pause"); onClicked: plot.paused = !plot.paused }
-        PlotButton_ { objectName: "zoomIn"; text: "+"; Accessible.name: qsTr("Show less time"); onClicked: plotted.zoom(0.5, 1) }
-        PlotButton_ { objectName: "zoomOut"; text: "−"; Accessible.name: qsTr("Show more time"); onClicked: plotted.zoom(2, 1) }
+        PlotButton_ { objectName: "zoomIn"; text: "+"; Accessible.name: qsTr("Show less time"); onClicked: plotted.zoomBy(2, 1) }
+        PlotButton_ { objectName: "zoomOut"; text: "−"; Accessible.name: qsTr("Show more time"); onClicked: plotted.zoomBy(0.5, 1) }
         PlotButton_ { objectName: "fit"; text: qsTr("Fit"); Accessible.name: qsTr("Fit the axes to the data"); onClicked: plot.fit() }
         PlotButton_ { visible: plot.folder !== ""; text: qsTr("CSV"); Accessible.name: qsTr("Save as CSV"); onClicked: plot.save_(".csv") }
         PlotButton_ { visible: plot.folder !== ""; text: qsTr("PNG"); Accessible.name: qsTr("Save as PNG"); onClicked: plot.save_(".png") }
@@ -294,7 +298,7 @@ LiveFrame {
             onActiveChanged: before_ = 1
             onActiveScaleChanged: {
                 if (active && activeScale > 0)
-                    plotted.zoom(before_ / activeScale, centroid.position.x / area.width)
+                    plotted.zoomBy(activeScale / before_, centroid.position.x / area.width)
                 before_ = activeScale
             }
         }
@@ -311,17 +315,17 @@ LiveFrame {
                 }
             }
             onExited: plot.cursor = -1
-            onDoubleClicked: { plot.fit(); plot.live() }
+            onDoubleClicked: { plot.fit(); plot.paused = false }
             onWheel: function(wheel) {
                 const turn = wheel.angleDelta.y || wheel.angleDelta.x
                 if (!turn)
                     return
                 if (wheel.modifiers & Qt.ControlModifier)
-                    plotted.zoomValues(turn > 0 ? 0.8 : 1.25, 1 - wheel.y / height)
+                    plotted.zoomValuesBy(turn > 0 ? 1.25 : 0.8, 1 - wheel.y / height)
                 else if ((wheel.modifiers & Qt.ShiftModifier) || !wheel.angleDelta.y)
                     plotted.scroll((turn > 0 ? -0.1 : 0.1) * plotted.window)
                 else
-                    plotted.zoom(turn > 0 ? 0.8 : 1.25, plot.paused ? wheel.x / width : 1)
+                    plotted.zoomBy(turn > 0 ? 1.25 : 0.8, plot.paused ? wheel.x / width : 1)
             }
         }
         Rectangle {

@@ -38,7 +38,7 @@ LiveFrame {
     readonly property alias elapsed: recorder.elapsed
     readonly property alias size: recorder.size
     readonly property alias messageCount: recorder.messageCount
-    readonly property alias dropped: recorder.dropped
+    readonly property alias lost: recorder.lost
     readonly property alias markCount: recorder.markCount
     // Bytes that are free on the disk; -1 while unknown.
     readonly property alias free: recorder.free
@@ -139,11 +139,11 @@ LiveFrame {
                 parts.push(qsTr("%1 messages").arg(control.messageCount))
                 if (control.markCount)
                     parts.push(qsTr("%1 marks").arg(control.markCount))
-                if (control.dropped)
-                    parts.push(qsTr("%1 LOST: the disk is too slow").arg(control.dropped))
+                if (control.lost)
+                    parts.push(qsTr("%1 LOST: the disk is too slow").arg(control.lost))
                 return parts.join(" · ")
             }
-            color: control.dropped ? Theme.bad : Theme.dim
+            color: control.lost ? Theme.bad : Theme.dim
             font.pixelSize: Theme.small
         }
         ThemeText {

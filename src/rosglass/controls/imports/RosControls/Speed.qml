@@ -4,7 +4,7 @@ import RosControls 1.0
 import "fields.js" as Fields
 
 LiveFrame {
-    id: speed
+    id: control
 
     // The topic; without one, the first nav_msgs/Odometry.
     property string topic
@@ -17,7 +17,7 @@ LiveFrame {
     property var command: null
 
     // Metres per second along x and y of the robot, radians per second about z; NaN while unknown.
-    readonly property real forward: twist_ ? twist_.linear.x : NaN
+    readonly property real speed: twist_ ? twist_.linear.x : NaN
     readonly property real sideways: twist_ ? twist_.linear.y : NaN
     readonly property real turn: twist_ ? twist_.angular.z : NaN
     // Why a steered robot does not drive, in words; empty if it does, or is not steered.
@@ -30,7 +30,7 @@ LiveFrame {
     readonly property string fault_: unit !== "m/s" && unit !== "km/h" ? qsTr("unit is \"m/s\" or \"km/h\", not \"%1\"").arg(unit)
         : turnUnit !== "°/s" && turnUnit !== "rad/s" ? qsTr("turnUnit is \"°/s\" or \"rad/s\", not \"%1\"").arg(turnUnit)
         : !twist_ ? ""
-        : isNaN(forward) ? qsTr("linear.x is not a number")
+        : isNaN(speed) ? qsTr("linear.x is not a number")
         : isNaN(sideways) ? qsTr("linear.y is not a number")
         : isNaN(turn) ? qsTr("angular.z is not a number") : ""
 
@@ -46,14 +46,14 @@ LiveFrame {
     problem: live.problem || fault_
     contentHeight: Theme.large * 1.5 + Theme.small * 1.5
     Accessible.description: refusal ? qsTr("not driving: %1").arg(refusal) : status
-        || forward_.value + " " + forward_.unit + ", " + turn_.value + " " + turn_.unit
+        || speed_.value + " " + speed_.unit + ", " + turn_.value + " " + turn_.unit
 
     LiveTopic {
         id: live
-        topic: speed.topic
-        ns: speed.ns
+        topic: control.topic
+        ns: control.ns
         // By type alone, a command would be taken for a speed.
-        types: speed.topic ? ["nav_msgs/msg/Odometry", "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped",
+        types: control.topic ? ["nav_msgs/msg/Odometry", "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped",
                               "geometry_msgs/msg/TwistWithCovarianceStamped"] : ["nav_msgs/msg/Odometry"]
     }
 
@@ -77,38 +77,38 @@ LiveFrame {
         id: row
         objectName: "readings"
         anchors.centerIn: parent
-        visible: !speed.refusal
+        visible: !control.refusal
         spacing: Theme.gap * 1.5
         scale: Math.min(1, parent.width / Math.max(1, width))
 
         Reading {
-            id: forward_
+            id: speed_
             objectName: "forward"
-            value: speed.shown_(speed.forward * speed.factor_, speed.unit === "km/h" ? 1 : 2)
-            unit: speed.unit
+            value: control.shown_(control.speed * control.factor_, control.unit === "km/h" ? 1 : 2)
+            unit: control.unit
         }
         Reading {
             objectName: "sideways"
-            visible: Math.abs(speed.sideways) >= 0.005
-            value: speed.shown_(Math.abs(speed.sideways) * speed.factor_, speed.unit === "km/h" ? 1 : 2)
-            unit: speed.sideways < 0 ? qsTr("%1 right").arg(speed.unit) : qsTr("%1 left").arg(speed.unit)
+            visible: Math.abs(control.sideways) >= 0.005
+            value: control.shown_(Math.abs(control.sideways) * control.factor_, control.unit === "km/h" ? 1 : 2)
+            unit: control.sideways < 0 ? qsTr("%1 right").arg(control.unit) : qsTr("%1 left").arg(control.unit)
         }
         Reading {
             id: turn_
             objectName: "turn"
-            value: speed.turnUnit === "rad/s" ? speed.shown_(speed.turn, 2) : speed.shown_(speed.turn * 180 / Math.PI, 0)
-            unit: speed.turnUnit
+            value: control.turnUnit === "rad/s" ? control.shown_(control.turn, 2) : control.shown_(control.turn * 180 / Math.PI, 0)
+            unit: control.turnUnit
         }
     }
     ThemeText {
         objectName: "refusal"
         anchors.centerIn: parent
-        visible: speed.refusal !== ""
+        visible: control.refusal !== ""
         width: parent.width
         horizontalAlignment: Text.AlignHCenter
         wrapMode: Text.Wrap
         maximumLineCount: 3
-        text: qsTr("NOT DRIVING: %1").arg(Fields.bounded(speed.refusal))
+        text: qsTr("NOT DRIVING: %1").arg(Fields.bounded(control.refusal))
         color: Theme.bad
         font.weight: Font.Bold
     }
