@@ -27,6 +27,8 @@ Error
 ├── BagError
 ├── NoPictureError
 ├── QmlError
+│   ├── QmlSyntaxError
+│   └── BoundError              an expression would be overwritten by a value
 └── TransformException          the exceptions of tf2
     ├── LookupException
     ├── ConnectivityException
@@ -48,6 +50,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ArgumentError",
     "BagError",
+    "BoundError",
     "ConnectionLostError",
     "ConnectivityException",
     "ConversionError",
@@ -67,6 +70,7 @@ __all__ = [
     "NodeClosedError",
     "ParameterError",
     "QmlError",
+    "QmlSyntaxError",
     "RosArgumentError",
     "ServiceError",
     "ServiceUnavailableError",
@@ -280,6 +284,42 @@ class BagError(Error):
 
 class QmlError(Error):
     """A QML file is missing or has errors; the message lists them as ``file:line:column``."""
+
+
+class QmlSyntaxError(QmlError):
+    """The text of a QML file is incomplete or wrong; the message says what was expected.
+
+    Attributes:
+        file: Path of the file, or a label such as ``<text>``.
+        line: 1-based line number.
+        column: 1-based column.
+    """
+
+    def __init__(self, message: str, file: str = "<text>", line: int = 1, column: int = 1) -> None:
+        super().__init__(f"{file}:{line}:{column}: {message}")
+        self.file, self.line, self.column = file, line, column
+
+
+class BoundError(QmlError):
+    """A property has an expression, which a value would overwrite.
+
+    Attributes:
+        name: Name of the property.
+        expression: Text of the expression.
+        file: Path of the file, or a label such as ``<text>``.
+        line: 1-based line number.
+        column: 1-based column.
+    """
+
+    def __init__(
+        self, name: str, expression: str = "", file: str = "<text>", line: int = 1, column: int = 1
+    ) -> None:
+        super().__init__(
+            f"{file}:{line}:{column}: {name} is bound to an expression, which a value would "
+            f"overwrite: {expression}"
+        )
+        self.name, self.expression = name, expression
+        self.file, self.line, self.column = file, line, column
 
 
 class TransformException(Error):  # noqa: N818 - tf2's name
