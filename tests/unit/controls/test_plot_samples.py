@@ -61,6 +61,27 @@ def test_extremes_are_those_of_the_samples_in_each_column(step: int) -> None:
     assert high.max() == values[inside].max()
 
 
+@pytest.mark.parametrize("usual", [1, 2, 3, 6, 17])
+def test_extremes_of_bursts_and_silence_are_exact(usual: int) -> None:
+    random, count, step = np.random.default_rng(usual), 300, SECOND
+    lengths = usual + random.integers(0, 2, count)
+    others = random.integers(0, count, 60)
+    lengths[others] = random.integers(0, 40, 60)
+    column = np.repeat(np.arange(count), lengths)
+    times = np.sort(column * step + random.integers(0, step, len(column)))
+    values = random.normal(size=len(times))
+    values[random.integers(0, len(values), 50)] = np.nan
+    samples = Samples()
+    samples.add(times, values)
+    low, high = extremes(samples, 0, step, count)
+    for at in range(count):
+        own = values[column == at]
+        expected = (np.inf, -np.inf)
+        if len(own):
+            expected = np.fmin.reduce(own), np.fmax.reduce(own)
+        assert np.array_equal((low[at], high[at]), expected, equal_nan=True)
+
+
 def test_one_spike_is_seen_at_any_zoom() -> None:
     samples, times, _ = filled(300_000)
     samples.add(times[-1:] + MS, np.array([1e9]))

@@ -251,19 +251,36 @@ def _reduce(
     if first == last:
         low[first], high[first] = np.fmin.reduce(lows), np.fmax.reduce(highs)
         return
-    if len(times) < last - first:
-        column = (times - start) // step
-        begins = np.flatnonzero(column[1:] != column[:-1]) + 1
-        begins = np.concatenate(([0], begins))
-        columns = column[begins]
-    else:
-        edges = np.arange(first, last + 1, dtype=np.int64) * step + start
-        begins = np.searchsorted(times, edges)
-        begins[0] = 0
-        filled = np.flatnonzero(np.diff(begins, append=len(times)))
-        columns, begins = first + filled, begins[filled]
-    low[columns] = np.fmin.reduceat(lows, begins)
-    high[columns] = np.fmax.reduceat(highs, begins)
+    column = (times - start) // step
+    begins = np.append(0, np.flatnonzero(column[1:] != column[:-1]) + 1)
+    columns = column[begins]
+    low[columns], high[columns] = _extremes(lows, highs, begins)
+
+
+def _extremes(lows: Values, highs: Values, begins: NDArray[np.intp]) -> tuple[Values, Values]:
+    """Return the least and greatest values of the parts that begin at these indices.
+
+    Two windows of a power of two cover a part of usual length. numpy computes them for all parts
+    together, in half of the time of ``reduceat``, which goes from part to part.
+    """
+    ends = np.append(begins[1:], len(lows))
+    lengths = ends - begins
+    size = 1 << int(np.sort(lengths)[len(lengths) // 2]).bit_length() - 1
+    unusual = np.flatnonzero((lengths < size) | (lengths > 2 * size))
+    pairs = np.column_stack((begins[unusual], ends[unusual])).ravel()
+    pairs = pairs[pairs < len(lows)]
+    left, right = begins.copy(), ends - size
+    left[unusual] = right[unusual] = 0
+    found = []
+    for pick, values in ((np.fmin, lows), (np.fmax, highs)):
+        windows = values
+        for level in range(size.bit_length() - 1):
+            windows = pick(windows[: -(1 << level)], windows[1 << level :])
+        result = pick(windows[left], windows[right])
+        if len(unusual):
+            result[unusual] = pick.reduceat(values, pairs)[::2]
+        found.append(result)
+    return found[0], found[1]
 
 
 class Samples:
