@@ -198,7 +198,7 @@ def test_errors_are_shown_over_the_last_good_interface(
     root = overlay.root
     file.write_text(f"{IMPORTS}Item {{\n    Botton {{ }}\n}}")
     wait(lambda: overlay.problem)
-    assert overlay.problem == f"{file}:4:5: Botton is not a type"
+    assert overlay.problem == f"{file}:4:5: Botton is not a type; did you mean Button?"
     assert overlay.problem in caplog.text
     assert overlay.root is root
     picture = grab()

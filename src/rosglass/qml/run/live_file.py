@@ -5,16 +5,15 @@ from __future__ import annotations
 import ctypes
 import logging
 import os
-import re
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.errors import Error, QmlError
-from rosglass.extras import install_command
-from rosglass.qml.engine.log import forget_repeats, log_engine_warnings, plain_path
+from rosglass.qml.engine.log import forget_repeats, log_engine_warnings
 from rosglass.qml.engine.watchdog import Watchdog
+from rosglass.qml.run.load_errors import error_list
 from rosglass.qml.run.modules import import_folder, install, interface_file, is_own_window
 from rosglass.qml.run.renderer_choice import imported_modules
 from rosglass.qt import QT6, QtCore, QtQml, Signal, address, is_alive
@@ -36,7 +35,6 @@ __all__ = [
     "Made",
     "Watcher",
     "create",
-    "error_list",
 ]
 
 _LIBRARY = "libQt6Qml.so.6" if QT6 else "libQt5Qml.so.5"
@@ -148,118 +146,6 @@ class Watcher(QtCore.QObject):
                     self._full = True
                     _log.warning("%s has too many files to watch them all", root)
                 return
-
-
-_MODULE = re.compile(r'module "([\w.]+)"(?: version ([\d.]+))?')
-_UNVERSIONED = re.compile(r"\s*import\s+[\w.]+\s*(?:as\b|;|//|$)")
-_OURS = {"Ros", "Ros2", "RosControls", "RosCockpit"}
-_TYPE = re.compile(r"^(\w+) is not a type$")
-#: Types that only one of our modules has -> the module, and the type's name in the other one.
-_ONLY_IN = {
-    "Subscriber": ("Ros 1.0", "Subscription"),
-    "ImageTransportSubscriber": ("Ros 1.0", "ImageTransportSubscription"),
-    "Subscription": ("Ros2 1.0", "Subscriber"),
-    "ImageTransportSubscription": ("Ros2 1.0", "ImageTransportSubscriber"),
-}
-#: Import -> frequently used types that only this import provides.
-_IMPORTED_BY = {
-    "QtQuick.Controls 2.15": {
-        *("ApplicationWindow", "Button", "CheckBox", "ComboBox", "Dial", "Dialog", "Drawer"),
-        *("Label", "Menu", "Popup", "ProgressBar", "RoundButton", "ScrollView", "Slider"),
-        *("SpinBox", "StackView", "Switch", "TabBar", "TextArea", "TextField"),
-    },
-    "QtQuick.Layouts 1.15": {"ColumnLayout", "GridLayout", "RowLayout", "StackLayout"},
-    "QtQuick.Shapes 1.15": {"Shape", "ShapePath"},
-    "QtQuick.Window 2.15": {"Window"},
-    "RosRviz 1.0": {"AnchoredPopup", "MessageDialog"},
-    "RosControls 1.0": {
-        *("ActionPanel", "AlarmList", "Attitude", "Battery", "CameraGrid", "CameraView", "Compass"),
-        *("DiagnosticsView", "DriveKeys", "DriveStick", "EmergencyStop", "Gamepad", "GamepadView"),
-        *("Gauge", "GeoMap", "JointView", "LiveFrame", "LogView", "MapView", "MessageView"),
-        *("ModeSwitch", "NodeGraph", "ParameterForm", "Plot", "Recorder", "RobotSwitch"),
-        *("ServiceButton", "Speed", "TfTree", "Timeline", "TopicTree", "TwistCommand", "WhoSteers"),
-    },
-}
-#: Module -> the extra that installs it for Qt 6, and the command for Qt 5.
-_BROUGHT_BY = {
-    "QtMultimedia": ("camera", "apt install qml-module-qtmultimedia"),
-    "QtQuick3D": ("camera", ""),
-    "QtCharts": ("camera", "apt install qml-module-qtcharts"),
-    "QtQuick.Controls": ("", "apt install qml-module-qtquick-controls2"),
-    "QtQuick.Layouts": ("", "apt install qml-module-qtquick-layouts"),
-    "QtQuick.Window": ("", "apt install qml-module-qtquick-window2"),
-}
-#: Modules that Qt 6 has removed -> their replacements.
-_GONE = {
-    "QtQuick.Controls.Styles": "QtQuick.Controls 2.15",
-    "QtQuick.Extras": "QtQuick.Controls 2.15",
-    "QtQuick.Dialogs": "QtQuick.Dialogs 6.0",
-    "QtQuick.Controls": "QtQuick.Controls 2.15",
-    "QtGraphicalEffects": "Qt5Compat.GraphicalEffects",
-}
-
-
-def error_list(errors: Sequence[QtQml.QQmlError], file: Path) -> str:
-    """Return errors as ``file:line:column: message``, or ``file: message``, one per line.
-
-    Args:
-        errors: The errors from Qt.
-        file: The loaded file, for errors that name no file.
-    """
-    lines = []
-    for error in errors:
-        place = plain_path(error.url().toString()) or str(file)
-        text = error.description()
-        hint = _advice(text)
-        line, column = max(error.line(), 0), max(error.column(), 0)
-        if not line and "requires a version" in text:
-            line, column = _unversioned(place), 1
-        where = f"{place}:{line}:{column}" if line else place
-        lines.append(f"{where}: {text}{f'; {hint}' if hint else ''}")
-    return "\n".join(lines) or f"{file}: it could not be created"
-
-
-def _unversioned(place: str) -> int:
-    """Return the line of the first import without a version, or 0; Qt 5 does not report it."""
-    try:
-        lines = Path(place).read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        return 0
-    return next((n for n, line in enumerate(lines, 1) if _UNVERSIONED.match(line)), 0)
-
-
-def _advice(text: str) -> str:
-    """Return advice for an error; empty if its text suffices."""
-    if "requires a version" in text:
-        return "Qt 5 needs one after the module's name: import QtQuick 2.15"
-    kind = _TYPE.search(text)
-    if kind is not None and kind[1] in _ONLY_IN:
-        module, other = _ONLY_IN[kind[1]]
-        return f"{module} has it; the other module calls it {other}"
-    if kind is not None:
-        imports = (module for module, kinds in _IMPORTED_BY.items() if kind[1] in kinds)
-        return next((f"it comes with: import {module}" for module in imports), "")
-    found = _MODULE.search(text)
-    if found is None:
-        return ""
-    module, version = found[1], found[2]
-    if module == "RosScene" and not QT6:
-        return "it needs Qt 6 (PySide6): run the interface with rosglass from PyPI, outside of RViz"
-    if module in _OURS:
-        return f"its version is 1.0: import {module} 1.0"
-    for ours in _OURS:
-        if module.lower() == ours.lower():
-            return f"it is written {ours}: import {ours} 1.0"
-    if QT6 and module in _GONE:
-        return f"Qt 6 has {_GONE[module]} instead"
-    if version and "is not installed" in text and module.startswith("Qt"):
-        hint = "this Qt may have another version of it"
-    else:
-        hint = "folders that hold modules are named with -I FOLDER or in QML_IMPORT_PATH"
-    extra, command = _BROUGHT_BY.get(module, ("", ""))
-    if QT6:
-        command = install_command(extra) if extra else ""
-    return f"to install it: {command}" if command else hint
 
 
 #: Module -> the package above this one that registers its types, once a file imports it.
@@ -452,7 +338,7 @@ class LiveFile(QtCore.QObject):
         component = QtQml.QQmlComponent(engine, QtCore.QUrl.fromLocalFile(str(self.path)))
         root = create(component, engine)
         if root is None:
-            errors = error_list(component.errors(), self.path)
+            errors = error_list(component.errors(), self.path, paths)
             if engine is not self.engine:
                 component.deleteLater()
                 self._drop_engine(engine)

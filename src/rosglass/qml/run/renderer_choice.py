@@ -29,6 +29,7 @@ __all__ = [
     "RendererChoice",
     "ask_for_software",
     "choice",
+    "imported_folders",
     "imported_modules",
     "need_in_file",
     "need_in_items",
@@ -107,6 +108,22 @@ def imported_modules(file: Path, import_paths: Sequence[str]) -> set[str]:
     """
     files = _files(file, [Path(folder) for folder in import_paths])
     return {name for _, text in files for name, _ in _MODULE.findall(text)}
+
+
+def imported_folders(file: Path, import_paths: Sequence[str]) -> Iterator[tuple[str, str, Path]]:
+    """Yield name, version and folder of what a file imports; without a name, folders of files.
+
+    Args:
+        file: The file.
+        import_paths: Folders with QML modules.
+    """
+    text, paths = _read(file), [Path(folder) for folder in import_paths]
+    yield "", "", file.parent
+    for name in _FOLDER.findall(text):
+        yield "", "", _plain(file.parent / name)
+    for name, version in _MODULE.findall(text):
+        for folder in _places(name, version, paths):
+            yield name, version, folder
 
 
 def _files(file: Path, import_paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
