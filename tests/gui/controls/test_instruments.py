@@ -1,4 +1,4 @@
-"""The controls Attitude, Compass, Gauge and Speed."""
+"""The controls Attitude, Compass, Gauge, Lamp and Speed."""
 
 from __future__ import annotations
 
@@ -308,3 +308,51 @@ def test_convention_lies_beside_the_ladder(controls: Any, wait: Any) -> None:
     attitude.setProperty("width", 170)
     wait(lambda: axes.x() >= glass.x())
     assert axes.property("color").alpha() == 255
+
+
+# Lamp.
+
+VOLTAGE = "sensor_msgs/msg/BatteryState"
+
+
+def test_lamp_shows_a_boolean_in_words(controls: Any, shown: Any) -> None:
+    item, publish = shown('Lamp { path: "/topic:data"; tint: "bad" }', "std_msgs/msg/Bool")
+    assert (item.property("lit"), controls.find("text").property("text")) == (False, "?")
+    publish(data=True)
+    assert (item.property("lit"), controls.find("text").property("text")) == (True, "ON")
+    publish(data=False)
+    assert (item.property("lit"), controls.find("text").property("text")) == (False, "OFF")
+
+
+def test_lamp_has_thresholds_with_hysteresis(controls: Any, shown: Any) -> None:
+    item, publish = shown(
+        'Lamp { path: "/topic:voltage"; above: 22; below: 18; hysteresis: 1 }', VOLTAGE
+    )
+    lit = []
+    for voltage in (21.5, 22.0, 21.5, 20.9, 18.5, 18.0, 18.5, 19.5, math.inf, math.nan):
+        publish(voltage=voltage)
+        lit.append(item.property("lit"))
+    assert lit == [False, True, True, False, False, True, True, False, True, False]
+    assert item.property("problem") == "not a number"
+    item.setProperty("above", 10.0)
+    publish(voltage=19.0)
+    assert item.property("lit")
+
+
+@pytest.mark.parametrize(
+    ("lamp", "problem"),
+    [
+        ("Lamp {}", "set path"),
+        ('Lamp { path: "/topic:data"; tint: "pink" }', "pink"),
+        ('Lamp { path: "/topic" }', "topic:field"),
+        ('Lamp { path: "/topic:speed" }', "speed"),
+    ],
+)
+def test_lamp_says_what_is_wrong(controls: Any, wait: Any, lamp: str, problem: str) -> None:
+    publisher = controls.robot.create_publisher("/topic", "std_msgs/msg/Bool")
+    item = controls.show(lamp)
+    if "speed" in lamp:
+        wait(publisher.subscription_count)
+        publisher.publish(data=True)
+    wait(lambda: problem in item.property("problem"))
+    assert not item.property("lit")

@@ -98,6 +98,44 @@ def test_a_number_is_dragged_onto_a_plot(controls: Any, wait: Any) -> None:
     wait(lambda: controls.find("dragged", controls.find("tree")).x() == 0)
 
 
+@pytest.mark.parametrize("control", ["Gauge", "Lamp"])
+def test_a_number_is_dragged_onto_a_control_of_one_value(
+    controls: Any, wait: Any, control: str
+) -> None:
+    publisher = controls.robot.create_publisher("/scan", SCAN)
+    controls.show(
+        """Item { anchors.fill: parent
+            MessageView { topic: "/scan"; width: parent.width; height: 400 }
+            CONTROL { objectName: "control"; y: 410; width: parent.width; height: 140 }
+        }""".replace("CONTROL", control),
+        height=560,
+    )
+    wait(publisher.subscription_count)
+    publisher.publish(range_max=30.5, ranges=[7.5])
+    wait(lambda: "ranges" in rows(controls, "key"))
+    shown = controls.find("control")
+    for key, path, value in (
+        ("range_max", "/scan:range_max", 30.5),
+        ("ranges", "/scan:ranges[0]", 7.5),
+    ):
+        line = controls.find("rows").property("contentItem")
+        wait.signals(controls.window.frameSwapped)
+        hands = [one for one in _items(line, "hand") if one.parentItem().isVisible()]
+        numbers = [at for at, found in enumerate(rows(controls, "path")) if found]
+        assert len(hands) == len(numbers)
+        hands.sort(key=lambda hand: hand.mapToScene(hand.position()).y())
+        drag(controls, hands[numbers.index(rows(controls, "key").index(key))], shown)
+        wait(lambda path=path: shown.property("path") == path)
+        wait(lambda: publisher.subscription_count() == 2)
+        publisher.publish(range_max=30.5, ranges=[7.5])
+        wait(lambda value=value: shown.property("value") == value)
+
+
+def _items(item: Any, name: str) -> list[Any]:
+    found = [item] if item.objectName() == name else []
+    return [*found, *(one for child in item.childItems() for one in _items(child, name))]
+
+
 def test_an_edited_message_is_published(controls: Any, wait: Any) -> None:
     view, _ = show(controls, wait, "/pose", POSE, pose={"position": {"x": 1.0}})
     received: list[Any] = []

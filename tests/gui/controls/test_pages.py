@@ -19,7 +19,10 @@ FILES = dict(
     re.findall(r"^(?:singleton )?(\w+) 1\.0 (\w+\.qml)$", (MODULE / "qmldir").read_text(), re.M)
 )
 #: Parts of controls, of which the page of Theme has the names only.
-PARTS = {name for name in FILES if name.startswith("Theme") and name != "Theme"} | {"FocusRing"}
+PARTS = {name for name in FILES if name.startswith("Theme") and name != "Theme"} | {
+    "FocusRing",
+    "PathDrop",
+}
 #: Parts of one control, whose page names them.
 MAP_PARTS = {name for name in {*FILES, *TYPES} if name.startswith("Map") and name != "MapView"}
 MAP_PARTS |= {"GeoScene"}

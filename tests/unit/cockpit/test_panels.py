@@ -15,7 +15,7 @@ from rosglass.errors import Error
 
 MODULE = Path(rosglass.__file__).parent / "controls/imports/RosControls"
 #: Types of RosControls that only other controls use.
-PARTS = {"FocusRing", "LiveFrame", "Theme", "MapButton", "MapGoals", "MapMark", "MapPlane",
+PARTS = {"FocusRing", "LiveFrame", "PathDrop", "Theme", "MapButton", "MapGoals", "MapMark", "MapPlane",
          "MapScale", "MapTiles", "MessageForm"}  # fmt: skip
 CATALOGUE = {panel.name: panel for panel in panels.controls()}
 

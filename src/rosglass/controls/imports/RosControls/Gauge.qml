@@ -66,7 +66,7 @@ LiveFrame {
     source: live
     filled: !isNaN(value)
     problem: live.problem
-        || (!path ? qsTr("set path: \"topic:field\"") : "")
+        || (!path ? qsTr("set path: \"topic:field\", or drop a field here") : "")
         || (from < to ? "" : qsTr("from %1 is not less than to %2").arg(from).arg(to))
         || (style === "dial" || style === "bar" ? "" : qsTr("style is \"dial\" or \"bar\", not \"%1\"").arg(style))
         || (live.message !== undefined && isNaN(live.number) ? qsTr("not a number") : "")
@@ -188,5 +188,9 @@ LiveFrame {
                 }
             }
         }
+    }
+    PathDrop {
+        anchors.fill: parent
+        onTaken: function(path) { gauge.path = path }
     }
 }

@@ -218,7 +218,7 @@ LiveFrame {
                         }
                     }
                 }
-                // What is dropped on a Plot.
+                // What is dropped on a Plot, a Gauge or a Lamp.
                 Item {
                     id: dragged
                     objectName: "dragged"

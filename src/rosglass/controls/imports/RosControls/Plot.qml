@@ -372,20 +372,10 @@ LiveFrame {
                 }
             }
         }
-        DropArea {
+        PathDrop {
             anchors.fill: parent
-            keys: ["rosglass/path"]
-            onDropped: function(drop) {
-                const path = drop.source && drop.source.path ? drop.source.path : drop.getDataAsString("rosglass/path")
-                plot.add(path)
-                drop.accept()
-            }
-            Rectangle {
-                anchors.fill: parent
-                visible: parent.containsDrag
-                color: "transparent"
-                border { color: Theme.accent; width: 2 }
-            }
+            arrays: true
+            onTaken: function(path) { plot.add(path) }
         }
         FocusRing {}
     }
