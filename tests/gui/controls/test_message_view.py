@@ -61,6 +61,12 @@ def test_long_arrays_are_counted_and_every_element_is_reached(controls: Any, wai
     assert len(rows(controls, "key")) < 200
 
 
+def test_text_with_the_mark_of_another_value_is_read_out_as_it_is(controls: Any, wait: Any) -> None:
+    show(controls, wait, "/text", "std_msgs/msg/String", data="%3 and %2")
+    row = controls.find("rows").property("currentItem")
+    assert row.property("label").strip() == "data: %3 and %2"
+
+
 def test_hostile_texts_stay_in_one_line(controls: Any, wait: Any) -> None:
     show(controls, wait, "/text", "std_msgs/msg/String", data="<b>a</b>\n\x1b" + "x" * 100_000)
     value = rows(controls, "value")[0]

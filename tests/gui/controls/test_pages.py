@@ -75,6 +75,15 @@ def test_imports_have_versions(file: Path) -> None:
 
 
 @pytest.mark.parametrize("file", sorted(MODULE.glob("*.qml")), ids=lambda file: file.stem)
+def test_values_are_filled_into_a_text_at_once(file: Path) -> None:
+    """In a chain of arg(), a robot's text "%2" would be replaced by the next value."""
+    text, before = file.read_text(encoding="utf-8"), ""
+    while text != before:
+        assert not re.search(r"\.arg<>\s*\.arg<>", text), "use Fields.fill()"
+        text, before = re.sub(r"\([^()]*\)", "<>", text), text
+
+
+@pytest.mark.parametrize("file", sorted(MODULE.glob("*.qml")), ids=lambda file: file.stem)
 def test_controls_have_no_colours_of_their_own(file: Path) -> None:
     if file.stem != "Theme":
         assert re.findall(r"\"#[0-9a-fA-F]{3,8}\"", file.read_text(encoding="utf-8")) == []

@@ -231,7 +231,7 @@ LiveFrame {
             try {
                 Fields.assign(value, entry.path, Fields.parse(entry.kind, entry.text))
             } catch (error) {
-                formProblem_ = qsTr("%1 %2").arg(entry.path).arg(error.message)
+                formProblem_ = Fields.fill(qsTr("%1 %2"), [entry.path, error.message])
                 return null
             }
         }

@@ -132,7 +132,7 @@ LiveFrame {
         delegate: Rectangle {
             id: row
             readonly property color tint: list.tints_[model.level]
-            readonly property string when: model.active ? model.began : qsTr("%1 to %2").arg(model.began).arg(model.ended)
+            readonly property string when: model.active ? model.began : Fields.fill(qsTr("%1 to %2"), [model.began, model.ended])
             width: ListView.view.width
             height: Math.max(Theme.touch, Math.round(Theme.normal * 2.6))
             color: ListView.isCurrentItem ? Theme.track : "transparent"

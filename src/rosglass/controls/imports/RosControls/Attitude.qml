@@ -2,6 +2,7 @@
 import QtQuick 2.15
 import RosControls 1.0
 import "orientation.js" as Orientation
+import "fields.js" as Fields
 
 LiveFrame {
     id: attitude
@@ -31,7 +32,7 @@ LiveFrame {
     source: live
     problem: live.problem || fault_
     contentHeight: 140 * Theme.size
-    note: known_ ? qsTr("pitch %1° roll %2°").arg(Orientation.whole(pitch)).arg(Orientation.whole(roll)) : ""
+    note: known_ ? Fields.fill(qsTr("pitch %1° roll %2°"), [Orientation.whole(pitch), Orientation.whole(roll)]) : ""
     Accessible.description: status || !known_ ? status
         : (pitch < 0 ? qsTr("nose down %1°") : qsTr("nose up %1°")).arg(Orientation.whole(Math.abs(pitch))) + ", "
           + (roll < 0 ? qsTr("left side down %1°") : qsTr("right side down %1°")).arg(Orientation.whole(Math.abs(roll)))

@@ -1,6 +1,7 @@
 // How much is left in a battery, and for how long, of sensor_msgs/BatteryState.
 import QtQuick 2.15
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: battery
@@ -30,7 +31,7 @@ LiveFrame {
 
     function duration_(seconds) {
         const minutes = Math.round(seconds / 60)
-        return minutes < 60 ? qsTr("%1 min").arg(minutes) : qsTr("%1 h %2 min").arg(Math.floor(minutes / 60)).arg(minutes % 60)
+        return minutes < 60 ? qsTr("%1 min").arg(minutes) : Fields.fill(qsTr("%1 h %2 min"), [Math.floor(minutes / 60), minutes % 60])
     }
 
     title: qsTr("Battery")

@@ -1,6 +1,7 @@
 // What the parts of a robot report about themselves, of diagnostic_msgs/DiagnosticArray.
 import QtQuick 2.15
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: diagnostics
@@ -56,8 +57,9 @@ LiveFrame {
         moreTint: live.omitted ? Theme.warn : Theme.dim
         more: {
             const parts = []
-            if (live.filter && live.total > view.count)
-                parts.push(qsTr("%1 filtered out").arg(live.total - view.count))
+            const hidden = live.total - (live.rows ? live.rows.count : 0)
+            if (live.filter && hidden > 0)
+                parts.push(qsTr("%1 filtered out").arg(hidden))
             if (live.omitted)
                 parts.push(qsTr("%1 reports of further parts not shown").arg(live.omitted))
             if (live.lost)
@@ -68,7 +70,7 @@ LiveFrame {
         delegate: Item {
             id: row
             readonly property color tint: diagnostics.tints_[model.level]
-            readonly property string summary: model.silent >= 0 ? qsTr("silent for %1 s, said: %2").arg(model.silent).arg(model.text) : model.text
+            readonly property string summary: model.silent >= 0 ? Fields.fill(qsTr("silent for %1 s, said: %2"), [model.silent, model.text]) : model.text
             width: ListView.view.width
             height: line.height + (details.item ? details.item.height + Theme.gap / 2 : 0)
 

@@ -168,7 +168,7 @@ Item {
         const type = serviceType || known[0] || (releaseService ? "std_srvs/srv/Trigger" : "std_srvs/srv/SetBool")
         const switches = type.endsWith("/SetBool")
         if (!switches && !type.endsWith("/Trigger")) {
-            problem = qsTr("%1 has the type %2, which is not Trigger or SetBool").arg(name).arg(type)
+            problem = Fields.fill(qsTr("%1 has the type %2, which is not Trigger or SetBool"), [name, type])
             return
         }
         if (!switches && !wanted && !releaseService) {

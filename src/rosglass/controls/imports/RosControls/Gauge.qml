@@ -1,6 +1,7 @@
 // A number of any topic on a dial or a bar, with thresholds.
 import QtQuick 2.15
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: gauge
@@ -67,7 +68,7 @@ LiveFrame {
     filled: !isNaN(value)
     problem: live.problem
         || (!path ? qsTr("set path: \"topic:field\", or drop a field here") : "")
-        || (from < to ? "" : qsTr("from %1 is not less than to %2").arg(from).arg(to))
+        || (from < to ? "" : Fields.fill(qsTr("from %1 is not less than to %2"), [from, to]))
         || (style === "dial" || style === "bar" ? "" : qsTr("style is \"dial\" or \"bar\", not \"%1\"").arg(style))
         || (live.message !== undefined && isNaN(live.number) ? qsTr("not a number") : "")
     note: isNaN(value) ? "" : value > to ? qsTr("above %1").arg(shown_(to)) : value < from ? qsTr("below %1").arg(shown_(from)) : ""

@@ -1,6 +1,7 @@
 // The log messages of all nodes, of rcl_interfaces/Log or rosgraph_msgs/Log.
 import QtQuick 2.15
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: log
@@ -61,7 +62,7 @@ LiveFrame {
                 implicitHeight: Theme.touch * 0.75
                 text: log.letters_[index] + " " + (log.counts[index] < 10000 ? log.counts[index] : Math.floor(log.counts[index] / 1000) + "k")
                 tint: index < log.minLevel ? Theme.dim : index ? log.tints_[index] : Theme.accent
-                Accessible.name: qsTr("show from %1, %2 messages").arg(log.names_[index]).arg(log.counts[index])
+                Accessible.name: Fields.fill(qsTr("show from %1, %2 messages"), [log.names_[index], log.counts[index]])
                 onClicked: log.minLevel = index
             }
         }
@@ -112,7 +113,7 @@ LiveFrame {
         moreTint: live.lost ? Theme.warn : Theme.dim
         more: {
             const parts = []
-            const hidden = live.kept - view.count
+            const hidden = live.kept - (live.rows ? live.rows.count : 0)
             if (hidden > 0 && !log.paused)
                 parts.push(qsTr("%1 filtered out").arg(hidden))
             if (live.removed)

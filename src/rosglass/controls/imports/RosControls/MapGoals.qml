@@ -61,7 +61,7 @@ QtObject {
             return refuse_(qsTr("not sent: the frame of the map is not known"))
         for (const pose of list)
             if (!isFinite(pose.x) || !isFinite(pose.y) || !isFinite(pose.yaw))
-                return refuse_(qsTr("not sent: %1, %2, %3 is not a pose").arg(pose.x).arg(pose.y).arg(pose.yaw))
+                return refuse_(Fields.fill(qsTr("not sent: %1, %2, %3 is not a pose"), [pose.x, pose.y, pose.yaw]))
         return true
     }
 
@@ -186,7 +186,7 @@ QtObject {
             return
         const parts = []
         if (active === "waypoints")
-            parts.push(qsTr("waypoint %1 of %2").arg(Math.min(reached + 1, poses.length)).arg(poses.length))
+            parts.push(Fields.fill(qsTr("waypoint %1 of %2"), [Math.min(reached + 1, poses.length), poses.length]))
         parts.push(isFinite(distance) ? qsTr("%1 m left").arg(distance.toFixed(1)) : qsTr("driving"))
         status = parts.join(", ")
         failed = false

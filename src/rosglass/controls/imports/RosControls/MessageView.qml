@@ -2,6 +2,7 @@
 import QtQuick 2.15
 import Ros2 1.0
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: view
@@ -74,7 +75,7 @@ LiveFrame {
         objectName: "heading"
         width: parent.width
         text: view.topic === "" ? qsTr("No topic is selected.")
-            : view.type ? qsTr("%1  %2").arg(messages.topic).arg(view.type) : messages.topic
+            : view.type ? Fields.fill(qsTr("%1  %2"), [messages.topic, view.type]) : messages.topic
         color: Theme.dim
         font.pixelSize: Theme.small
     }
@@ -141,7 +142,7 @@ LiveFrame {
         Item {
             id: shown
 
-            readonly property string label: qsTr("%1: %2 %3").arg(row.name).arg(row.value || row.type).arg(row.unit)
+            readonly property string label: Fields.fill(qsTr("%1: %2 %3"), [row.name, row.value || row.type, row.unit])
             readonly property bool isEdited: view.editingKey_ === row.key && row.editable
 
             width: parent ? parent.width : 0
@@ -160,7 +161,7 @@ LiveFrame {
                 anchors { left: name.right; leftMargin: Theme.gap; right: kind.left; rightMargin: Theme.gap }
                 height: parent.height
                 verticalAlignment: Text.AlignVCenter
-                text: row.unit && row.value ? qsTr("%1 %2").arg(row.value).arg(row.unit) : row.value
+                text: row.unit && row.value ? Fields.fill(qsTr("%1 %2"), [row.value, row.unit]) : row.value
                 color: row.editable ? Theme.accent : Theme.text
             }
             Loader {

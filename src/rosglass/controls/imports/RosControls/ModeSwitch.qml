@@ -122,7 +122,7 @@ LiveFrame {
         const known = [type, announced[0], live.messageType].find(function(one) { return one })
         const kind = known || (typeof value === "number" ? "std_msgs/msg/Int32" : "std_msgs/msg/String")
         if (kind !== "std_msgs/msg/String" && integers_.indexOf(kind.replace(/^(\w+)\/(\w+)$/, "$1/msg/$2")) < 0) {
-            refuse_(qsTr("%1 has the type %2, which is not a String or an integer").arg(topic).arg(kind))
+            refuse_(Fields.fill(qsTr("%1 has the type %2, which is not a String or an integer"), [topic, kind]))
             return
         }
         if (publisher_ === null || published_ !== topic + " " + kind) {
@@ -207,7 +207,7 @@ LiveFrame {
             return
         if (!next) {
             refuse_(state_ === undefined ? qsTr("the node's state is unknown")
-                : qsTr("no transition leads from %1 to %2").arg(text_(state_)).arg(text_(requested)))
+                : Fields.fill(qsTr("no transition leads from %1 to %2"), [text_(state_), text_(requested)]))
             return
         }
         const turn = turn_, client = changeState_
@@ -218,7 +218,7 @@ LiveFrame {
             if (turn !== modeSwitch.turn_)
                 return
             if (!answer.success)
-                modeSwitch.refuse_(qsTr("refused: %1 did not become %2").arg(modeSwitch.nodeName).arg(next[1]))
+                modeSwitch.refuse_(Fields.fill(qsTr("refused: %1 did not become %2"), [modeSwitch.nodeName, next[1]]))
             else if (modeSwitch.requested !== undefined && next[1] !== modeSwitch.requested) {
                 modeSwitch.take_(next[1])
                 modeSwitch.step_()
@@ -269,7 +269,7 @@ LiveFrame {
     Timer {
         id: late
         interval: modeSwitch.timeout
-        onTriggered: modeSwitch.refuse_(qsTr("%1 was requested, and not confirmed within %2 s").arg(modeSwitch.text_(modeSwitch.requested)).arg((modeSwitch.timeout / 1000).toFixed(1)))
+        onTriggered: modeSwitch.refuse_(Fields.fill(qsTr("%1 was requested, and not confirmed within %2 s"), [modeSwitch.text_(modeSwitch.requested), (modeSwitch.timeout / 1000).toFixed(1)]))
     }
 
     // What was refused is said in full colour.

@@ -46,7 +46,7 @@ LiveFrame {
     age: total ? 0 : -1
     problem: parameters.problem ? Fields.bounded(parameters.problem)
         : node_ && !ready ? (total ? qsTr("NOT AVAILABLE: these values are old") : qsTr("waiting for %1").arg(node_)) : ""
-    note: total ? (parameters.count < total ? qsTr("%1 of %2").arg(parameters.count).arg(total) : String(total)) : ""
+    note: total ? (parameters.count < total ? Fields.fill(qsTr("%1 of %2"), [parameters.count, total]) : String(total)) : ""
     contentWidth: 380 * Theme.size
     contentHeight: 300 * Theme.size
 
@@ -181,7 +181,7 @@ LiveFrame {
                     color: Theme.dim
                     verticalAlignment: Text.AlignVCenter
                     Accessible.role: Accessible.StaticText
-                    Accessible.name: qsTr("%1, read-only: %2").arg(row.name).arg(text)
+                    Accessible.name: Fields.fill(qsTr("%1, read-only: %2"), [row.name, text])
                 }
             }
             Component {

@@ -151,7 +151,7 @@ LiveFrame {
             width: parent.width
             visible: text !== ""
             text: !control.file || control.problem ? "" : control.recording ? control.file
-                : control.completing ? qsTr("completing %1").arg(control.file) : control.size > 0 ? qsTr("%1: %2").arg(control.ending).arg(control.file) : control.ending
+                : control.completing ? qsTr("completing %1").arg(control.file) : control.size > 0 ? Fields.fill(qsTr("%1: %2"), [control.ending, control.file]) : control.ending
             color: Theme.dim
             elide: Text.ElideMiddle
             font.pixelSize: Theme.small

@@ -2,6 +2,7 @@
 import QtQuick 2.15
 import Ros2 1.0
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: robots
@@ -72,7 +73,7 @@ LiveFrame {
             const inside = ns === "/" ? "/" : ns + "/"
             const twin = Object.keys(twins).find(function(node) { return node.startsWith(inside) && node !== graph.nodeName })
             return { ns: ns, name: name_(ns), present: present.indexOf(ns) >= 0,
-                     problem: twin ? qsTr("%1 robots of this name: that many nodes are called %2").arg(twins[twin]).arg(twin) : "" }
+                     problem: twin ? Fields.fill(qsTr("%1 robots of this name: that many nodes are called %2"), [twins[twin], twin]) : "" }
         })
         if (!current && automatic && found.length > 0 && found[0].present)
             select(found[0].ns)

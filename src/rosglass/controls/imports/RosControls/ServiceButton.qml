@@ -144,7 +144,7 @@ Item {
         onTriggered: {
             const was = control.ready
             const reason = was ? qsTr("no answer within %1 s; the robot may still do it").arg(control.limit_ / 1000)
-                : qsTr("no server of %1 within %2 s").arg(control.name_).arg(control.limit_ / 1000)
+                : Fields.fill(qsTr("no server of %1 within %2 s"), [control.name_, control.limit_ / 1000])
             // Before the requests are cancelled, which reports another reason.
             control.fail_(reason)
             control.client_.cancelRequests()

@@ -1,6 +1,7 @@
 // The frames of the robot as a tree, with the age and rate of each transform, and what is wrong with it.
 import QtQuick 2.15
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: view
@@ -22,7 +23,7 @@ LiveFrame {
     age: frames.total > 0 ? 0 : -1
     note: {
         const parts = [frames.count === frames.total ? qsTr("%1 frames").arg(frames.total)
-                                                     : qsTr("%1 of %2 frames").arg(frames.count).arg(frames.total)]
+                                                     : Fields.fill(qsTr("%1 of %2 frames"), [frames.count, frames.total])]
         if (frames.faults > 0)
             parts.push(qsTr("%1 wrong").arg(frames.faults))
         if (frames.old > 0)
@@ -75,7 +76,7 @@ LiveFrame {
             readonly property string state_: row.fault ? row.fault
                 : row.parentFrame === "" ? "" : row.isStatic ? qsTr("static")
                 : row.isOld ? qsTr("OLD: %1 s").arg(row.age.toFixed(row.age < 10 ? 1 : 0))
-                : row.rate > 0 ? qsTr("%1 Hz · %2 s").arg(row.rate).arg(row.age.toFixed(1)) : qsTr("%1 s").arg(row.age.toFixed(1))
+                : row.rate > 0 ? Fields.fill(qsTr("%1 Hz · %2 s"), [row.rate, row.age.toFixed(1)]) : qsTr("%1 s").arg(row.age.toFixed(1))
             readonly property string label: row.name + ", " + state_
 
             width: parent ? parent.width : 0

@@ -62,7 +62,7 @@ LiveFrame {
     contentWidth: 420 * Theme.size
     contentHeight: slider.height + row.height + Theme.gap / 2
     activeFocusOnTab: true
-    Accessible.description: status || qsTr("%1 of %2").arg(Units.clock(position, true)).arg(Units.clock(duration, true))
+    Accessible.description: status || Fields.fill(qsTr("%1 of %2"), [Units.clock(position, true), Units.clock(duration, true)])
 
     Keys.onPressed: function(event) {
         const far = step * (event.modifiers & Qt.ShiftModifier ? 10 : 1)
@@ -135,7 +135,7 @@ LiveFrame {
                 height: slider.height / 2 - 2
                 color: Theme.warn
                 Accessible.role: Accessible.StaticText
-                Accessible.name: qsTr("%1: %2").arg(Units.clock(modelData.time, true)).arg(Fields.bounded(modelData.text, 100))
+                Accessible.name: Fields.fill(qsTr("%1: %2"), [Units.clock(modelData.time, true), Fields.bounded(modelData.text, 100)])
                 MouseArea {
                     anchors { fill: parent; margins: -4 }
                     hoverEnabled: true
@@ -197,7 +197,7 @@ LiveFrame {
             objectName: "time"
             anchors.verticalCenter: parent.verticalCenter
             width: Math.max(0, Math.min(implicitWidth, row.width - x))
-            text: qsTr("%1 / %2").arg(Units.clock(timeline.position, true)).arg(Units.clock(timeline.duration, true))
+            text: Fields.fill(qsTr("%1 / %2"), [Units.clock(timeline.position, true), Units.clock(timeline.duration, true)])
             color: timeline.ready ? Theme.text : Theme.dim
         }
         ThemeText {

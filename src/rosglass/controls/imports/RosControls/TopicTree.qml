@@ -3,6 +3,7 @@ import QtQuick 2.15
 import Ros2 1.0
 import RosControls 1.0
 import "units.js" as Units
+import "fields.js" as Fields
 
 LiveFrame {
     id: view
@@ -25,7 +26,7 @@ LiveFrame {
     title: qsTr("Topics")
     source: topics
     note: topics.count === topics.total ? qsTr("%1 topics").arg(topics.total)
-        : qsTr("%1 of %2 topics").arg(topics.count).arg(topics.total)
+        : Fields.fill(qsTr("%1 of %2 topics"), [topics.count, topics.total])
     contentWidth: 360 * Theme.size
     contentHeight: 300 * Theme.size
 
@@ -69,7 +70,7 @@ LiveFrame {
         Column {
             id: shown
 
-            readonly property string label: row.isTopic ? qsTr("%1, %2").arg(row.topic).arg(row.conflict || row.type) : row.name
+            readonly property string label: row.isTopic ? Fields.fill(qsTr("%1, %2"), [row.topic, row.conflict || row.type]) : row.name
 
             width: parent ? parent.width : 0
 
@@ -97,7 +98,7 @@ LiveFrame {
                     anchors.right: parent.right
                     height: parent.height
                     verticalAlignment: Text.AlignVCenter
-                    text: row.isTopic ? qsTr("%1 → %2").arg(row.publishers).arg(row.subscribers)
+                    text: row.isTopic ? Fields.fill(qsTr("%1 → %2"), [row.publishers, row.subscribers])
                         : row.topics === 1 ? qsTr("1 topic") : row.topics > 1 ? qsTr("%1 topics").arg(row.topics) : ""
                     color: row.isTopic && row.publishers === 0 ? Theme.warn : Theme.dim
                     font.pixelSize: Theme.small
@@ -154,8 +155,7 @@ LiveFrame {
                 width: parent.width
                 visible: view.measures
                 text: measured.problem ? measured.problem
-                    : measured.frequency > 0 ? qsTr("%1 Hz, %2/s, %3 each").arg(measured.frequency.toPrecision(3))
-                        .arg(Units.bytes(measured.bandwidth)).arg(Units.bytes(measured.bandwidth / measured.frequency))
+                    : measured.frequency > 0 ? Fields.fill(qsTr("%1 Hz, %2/s, %3 each"), [measured.frequency.toPrecision(3), Units.bytes(measured.bandwidth), Units.bytes(measured.bandwidth / measured.frequency)])
                     : qsTr("nothing received in the last seconds")
                 color: measured.problem ? Theme.warn : Theme.dim
                 wrapMode: Text.Wrap

@@ -3,6 +3,7 @@
 import QtQuick 2.15
 import Ros2 1.0
 import RosControls 1.0
+import "fields.js" as Fields
 
 LiveFrame {
     id: who
@@ -59,10 +60,10 @@ LiveFrame {
                     others[one.node] = (others[one.node] || 0) + 1
             }
             if (own > 1 && twins[mine])
-                found.push({ level: 2, text: qsTr("another node called %1 publishes %2").arg(mine).arg(topic) })
+                found.push({ level: 2, text: Fields.fill(qsTr("another node called %1 publishes %2"), [mine, topic]) })
             for (const node in others) {
                 const may = allowed.indexOf(node) >= 0
-                found.push({ level: may ? 0 : 1, text: may ? qsTr("%1 may steer by %2").arg(node).arg(topic) : qsTr("%1 also publishes %2").arg(node).arg(topic) })
+                found.push({ level: may ? 0 : 1, text: may ? Fields.fill(qsTr("%1 may steer by %2"), [node, topic]) : Fields.fill(qsTr("%1 also publishes %2"), [node, topic]) })
                 named[node] = true
             }
             const receivers = Ros2.getSubscriptionsInfo(topic).map(function(one) { return one.node })
@@ -79,7 +80,7 @@ LiveFrame {
                         else if (/\/msg\/Twist(Stamped)?$/.test(input.type) && commandTopics_().indexOf(input.name) < 0) {
                             for (const one of Ros2.getPublishersInfo(input.name))
                                 if (one.node !== mine)
-                                    found.push({ level: 0, text: qsTr("%1 steers by %2 through %3").arg(one.node).arg(input.name).arg(node) })
+                                    found.push({ level: 0, text: Fields.fill(qsTr("%1 steers by %2 through %3"), [one.node, input.name, node]) })
                         }
                     }
                 }
@@ -87,7 +88,7 @@ LiveFrame {
         }
         for (const node in twins)
             if (named[node] || node === mine)
-                found.push({ level: 2, text: qsTr("%1 nodes are called %2: all obey, or all steer").arg(twins[node]).arg(node) })
+                found.push({ level: 2, text: Fields.fill(qsTr("%1 nodes are called %2: all obey, or all steer"), [twins[node], node]) })
         const unique = locks.filter(function(one, at) { return locks.indexOf(one) === at }).slice(0, 32).sort()
         if (JSON.stringify(unique) !== JSON.stringify(locks_))
             locks_ = unique

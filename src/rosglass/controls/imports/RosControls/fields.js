@@ -13,6 +13,11 @@ function unconnected(state, detail) {
         : detail ? qsTr("the robot is not connected: %1").arg(bounded(detail)) : qsTr("the robot is not connected")
 }
 
+// A text with %1, %2 ... replaced by these values. A chain of arg() would replace a "%2" in the first value as well.
+function fill(text, values) {
+    return text.replace(/%([1-9])/g, (mark, number) => number <= values.length ? String(values[number - 1]) : mark)
+}
+
 // A text of a robot, in a length that a control has room for.
 function bounded(text, most) {
     const limit = most || 300, whole = String(text === undefined || text === null ? "" : text).slice(0, 4 * limit)
@@ -75,14 +80,14 @@ function parse(kind, text) {
         return text
     if (kind === "bool") {
         if (given !== "true" && given !== "false")
-            throw new Error("is true or false")
+            throw new Error(qsTr("is true or false"))
         return given === "true"
     }
     if (kind === "number") {
         const special = { nan: NaN, inf: Infinity, "+inf": Infinity, "-inf": -Infinity }[given.toLowerCase()]
         const number = special === undefined ? Number(given) : special
         if (given === "" || (isNaN(number) && special === undefined))
-            throw new Error("is not a number")
+            throw new Error(qsTr("is not a number"))
         // Longer integers than JavaScript's keep all their digits as text.
         return Number.isInteger(number) && !Number.isSafeInteger(number) ? given : number
     }
@@ -91,7 +96,7 @@ function parse(kind, text) {
         if (Array.isArray(value))
             return value
     } catch (error) {}
-    throw new Error("is not a list, such as [1, 2]")
+    throw new Error(qsTr("is not a list, such as [1, 2]"))
 }
 
 // Sets the field with this path in a message made of plain objects.
@@ -114,7 +119,7 @@ function refusal(response) {
             for (const reason of ["message", "status_message", "error_message", "reason", "error"])
                 if (has(reason) && typeof response[reason] === "string" && response[reason].trim() !== "")
                     return bounded(response[reason])
-            return "it gave no reason"
+            return qsTr("it gave no reason")
         }
     }
     return ""
