@@ -94,6 +94,17 @@ def test_only_values_have_an_edit_role(bench: Any) -> None:
     assert value == 1.5
 
 
+@pytest.mark.both_qt
+def test_arrays_that_may_grow_have_an_edit_role(bench: Any) -> None:
+    """Editors for qml6_ros2_plugin offer to add an element by it."""
+    script = """message = Ros2.createEmptyMessage("sensor_msgs/msg/Imu")
+        const fixed = data(at([2], 1), Qt.EditRole)
+        message = Ros2.createEmptyMessage("sensor_msgs/msg/JointState")
+        const edit = Qt.EditRole, cells = [at([0], 1), at([1], 1), at([1], 0)]
+        return [fixed === undefined, cells.map(cell => data(cell, edit) === undefined)]"""
+    assert run(bench, script) == [True, [True, False, True]]
+
+
 def test_an_edit_leaves_the_field_alone_that_is_typed_in(bench: Any) -> None:
     script = """const name = "geometry_msgs/msg/PointStamped"
         if (message === undefined) message = {"#messageType": name}

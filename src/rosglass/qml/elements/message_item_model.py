@@ -430,8 +430,10 @@ class MessageItemModel(QtCore.QAbstractItemModel):
             # Editors show a field for what has an edit role.
             return item.name if role == _DISPLAY else None
         if not item.is_leaf:
-            # Qt's own delegates warn about undefined.
-            return "" if role == _DISPLAY else None
+            # Qt's own delegates warn about undefined. Editors for qml6_ros2_plugin offer to add an
+            # element where an array has an edit role.
+            may_grow = item.is_array and not item.is_fixed
+            return "" if role == _DISPLAY or may_grow else None
         value = item.value
         return exact(value) if type(value) is int else value
 
