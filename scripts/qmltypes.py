@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rosglass.cockpit import modules as cockpit
 from rosglass.controls import modules as controls
 from rosglass.qml.elements import ros1, ros2
 from rosglass.qml.run import modules
@@ -41,6 +42,9 @@ def files() -> dict[Path, str]:
     found = {FOLDER6 / "RosScene" / "plugins.qmltypes": _module("RosScene", scene.load_types())}
     found[Path(controls.__file__).parent / "imports/RosControls/plugins.qmltypes"] = _module(
         "RosControls", controls.TYPES
+    )
+    found[Path(cockpit.__file__).parent / "imports/RosCockpit/plugins.qmltypes"] = _module(
+        "RosCockpit", cockpit.TYPES
     )
     for uri, module in (("Ros", ros1), ("Ros2", ros2)):
         found[FOLDER / uri / "plugins.qmltypes"] = _module(uri, module.TYPES)

@@ -99,7 +99,7 @@ class LayoutBench:
 @pytest.fixture
 def layouts(running: Any, wait: Callable[..., None]) -> LayoutBench:
     """A bench to show layouts on, connected to the robot."""
-    from rosglass.controls import register
+    from rosglass.cockpit.modules import register
 
     register()
     return LayoutBench(running, wait)

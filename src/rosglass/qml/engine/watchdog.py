@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.qml.engine.js_stack import JsStack
 from rosglass.qml.engine.log import Caller, log_from_qml
-from rosglass.qt import QtCore, QtQml, Slot, is_alive
+from rosglass.qt import QtCore, QtQml, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -143,6 +143,9 @@ class Watchdog(QtCore.QObject):
     Args:
         session: The session whose interfaces are watched.
     """
+
+    #: JavaScript of an engine was ended: the engine, and the text that reports it.
+    script_ended = Signal(QtCore.QObject, str)
 
     def __init__(self, session: Session) -> None:
         super().__init__()
@@ -365,6 +368,7 @@ class Watchdog(QtCore.QObject):
         def show() -> None:
             if is_alive(watched.engine):
                 watched.report(text)
+                self.script_ended.emit(watched.engine, text)
 
         self._session.executor.post(show)
 

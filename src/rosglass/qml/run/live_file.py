@@ -35,6 +35,7 @@ __all__ = [
     "Made",
     "Watcher",
     "create",
+    "register_imports",
 ]
 
 _LIBRARY = "libQt6Qml.so.6" if QT6 else "libQt5Qml.so.5"
@@ -54,17 +55,27 @@ def _completion() -> Callable[[QtQml.QQmlComponent], object]:
     return lambda component: complete(ctypes.c_void_p(address(component)))
 
 
-def create(component: QtQml.QQmlComponent, engine: QtQml.QQmlEngine) -> QtCore.QObject | None:
+def create(
+    component: QtQml.QQmlComponent,
+    context: QtQml.QQmlContext,
+    begun: Callable[[QtCore.QObject], None] = lambda _: None,
+) -> QtCore.QObject | None:
     """Create a component's object without the GIL; None if the component has errors.
 
     QQmlComponent.create holds the GIL while the first bindings and ``Component.onCompleted`` run,
     so that the watchdog could not end an endless one.
+
+    Args:
+        component: The component.
+        context: The context of the object.
+        begun: Called with the object before its first bindings run.
     """
     if component.isError():
         return None
-    root = component.beginCreate(engine.rootContext())
+    root = component.beginCreate(context)
     if root is None:
         return None
+    begun(root)
     _completion()(component)
     if component.isError():
         root.deleteLater()
@@ -151,11 +162,18 @@ class Watcher(QtCore.QObject):
 #: Module -> the package above this one that registers its types, once a file imports it.
 _REGISTERED_BY = {
     "RosControls": "rosglass.controls.modules",
-    # Its QML files use those controls.
-    "RosCockpit": "rosglass.controls.modules",
+    "RosCockpit": "rosglass.cockpit.modules",
 }
 if QT6:
     _REGISTERED_BY["RosScene"] = "rosglass.scene.app.modules"
+
+
+def register_imports(file: Path, engine: QtQml.QQmlEngine) -> None:
+    """Register the types of those of our modules that a file, or one that it uses, imports."""
+    for module in sorted(imported_modules(file, engine.importPathList()) & _REGISTERED_BY.keys()):
+        import_module(_REGISTERED_BY[module]).register()
+
+
 #: The QML file of a closable item that is only as large as its text.
 PANEL = Path(__file__).with_name("ErrorPanel.qml")
 #: Headings of an ErrorView, for what is below it.
@@ -331,14 +349,12 @@ class LiveFile(QtCore.QObject):
             self._session.reloading.emit()
         engine = self._new_engine() if self._used else self.engine
         self._used = True
-        paths = engine.importPathList()
         if not self._is_own:
-            for module in sorted(imported_modules(self.path, paths) & _REGISTERED_BY.keys()):
-                import_module(_REGISTERED_BY[module]).register()
+            register_imports(self.path, engine)
         component = QtQml.QQmlComponent(engine, QtCore.QUrl.fromLocalFile(str(self.path)))
-        root = create(component, engine)
+        root = create(component, engine.rootContext())
         if root is None:
-            errors = error_list(component.errors(), self.path, paths)
+            errors = error_list(component.errors(), self.path, engine.importPathList())
             if engine is not self.engine:
                 component.deleteLater()
                 self._drop_engine(engine)

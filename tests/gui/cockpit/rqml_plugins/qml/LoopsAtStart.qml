@@ -1,0 +1,5 @@
+import QtQuick
+
+Item {
+    Component.onCompleted: { while (true); }
+}
