@@ -45,7 +45,7 @@ _COMMENT = re.compile(r"//[^\r\n\u2028\u2029]*|/\*(?s:.*?)\*/")
 _OPEN_END = re.compile(r"\}[^}]*//[^\r\n]*$")
 _SPACE = re.compile(r"\s*")
 _ID = re.compile(r"[a-z_][A-Za-z0-9_]*")
-_PROPERTY = re.compile(r"[A-Za-z_][\w$]*(?:\.[A-Za-z_][\w$]*)*")
+_PROPERTY = re.compile(r"(?!\d)[$\w]+(?:\.(?!\d)[$\w]+)*")
 _MODULE = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*")
 _VERSION = re.compile(r"\d+(?:\.\d+)?")
 
@@ -65,13 +65,14 @@ class Document:
     Args:
         text: A whole file; a byte order mark and any line ends are kept.
         file: Its name, for errors.
+        is_part: The text is an object of a file, which may be ``Behavior on x {}``.
 
     Raises:
         QmlSyntaxError: The text is not QML: line, column, and what was expected.
     """
 
-    def __init__(self, text: str, file: str = "<text>") -> None:
-        self._scan = Scanner(text, file)
+    def __init__(self, text: str, file: str = "<text>", *, is_part: bool = False) -> None:
+        self._scan = Scanner(text, file, is_part)
         self.text, self.file = text, file
         self.root, self.imports = self._scan.root, self._scan.imports
         found = _NEWLINE.search(text)
@@ -143,17 +144,17 @@ class Document:
             raise ArgumentError(
                 "name", name, f"a property: in line {self._line(member)} is a {member.form}"
             )
-        text = self._value_text(value)
+        text, closed = self._value_text(value)
         if member is None:
-            return self._add_property(target, name, text)
+            return self._add_property(target, name, text, closed)
         if member.value_span is None:
             at = member.name_span.end
             return self._splice([(at, at, f": {text}")])
         if member.kind != "literal" and member.text != text and not overwrite:
             raise BoundError(name, member.text, self.file, *self.position(member.value_span.start))
-        return self._replace_value(member, value, text)
+        return self._replace_value(member, value, text, closed)
 
-    def _replace_value(self, member: Member, value: object, text: str) -> Document:
+    def _replace_value(self, member: Member, value: object, text: str, closed: bool) -> Document:
         old = member.text
         assert member.value_span is not None
         start, end = member.value_span
@@ -168,30 +169,26 @@ class Document:
                 old = old[slice(*place)]
             if old.startswith("'"):
                 text = quote(value, "'")
-        follower = self._rest_of_line(member.value_span.end)[0]
-        if old.endswith(("}", ";")) and self.text[follower : follower + 1] not in {
-            "",
-            "\n",
-            "\r",
-            ";",
-            "}",
-            "]",
-        }:
-            text += ";"
+        closed = closed and not member.type.startswith("list<")
+        if closed and not member.closed:
+            end = member.span.end
+        elif member.closed and not closed:
+            _, follower, ended = self._rest_of_line(end)
+            text += "" if ended or self.text[follower] == "}" else ";"
         return self._splice([(start, end, text)])
 
-    def _add_property(self, target: Object, name: str, text: str) -> Document:
+    def _add_property(self, target: Object, name: str, text: str, closed: bool) -> Document:
         for member in target.members:
             if member.group is not None and f"{name}.".startswith(f"{member.name}."):
                 rest = name[len(member.name) + 1 :]
-                return self._add_property(member.group, rest, text)
+                return self._add_property(member.group, rest, text, closed)
         after: Member | Object | None = None
         for item in target.items:
             if isinstance(item, Object):
                 break
             if item.form in {"value", "required", "group"} and not item.is_handler:
                 after = item
-        return self._insert(target, after, f"{name}: {text}")
+        return self._insert(target, after, f"{name}: {text}", closed)
 
     def remove_property(self, target: Object, name: str) -> Document:
         """Return the document without a property, with the comment behind it on its line.
@@ -278,7 +275,7 @@ class Document:
         place = self._place(children, index, before, after)
         if place < len(children):
             return self._insert_before(children[place], text)
-        return self._insert(parent, parent.items[-1] if parent.items else None, text, child=True)
+        return self._insert(parent, parent.items[-1] if parent.items else None, text, closed=True)
 
     def remove_object(self, target: Object) -> Document:
         """Return the document without an object, its comments included.
@@ -344,7 +341,7 @@ class Document:
         if place < len(children):
             return without._insert_before(children[place], text)
         last = parent.items[-1] if parent.items else None
-        return without._insert(parent, last, text, child=True)
+        return without._insert(parent, last, text, closed=True)
 
     def wrap_object(self, target: Object, text: str, index: int | None = None) -> Document:
         """Return the document with an object put into a new one, which takes its place.
@@ -360,6 +357,8 @@ class Document:
             ArgumentError: The place does not exist.
         """
         self._own(target)
+        if target.on:
+            raise ArgumentError("target", target.type, f"an object that is not on {target.on}")
         wrapper = Document(self._object_text(text))
         # The file's style, since the wrapper has none of its own yet.
         wrapper._newline, wrapper._unit = self._newline, self._unit
@@ -492,8 +491,9 @@ class Document:
         changed._newline, changed._unit = self._newline, self._unit
         return changed
 
-    def _value_text(self, value: object) -> str:
-        text = to_qml(value)
+    def _value_text(self, value: object) -> tuple[str, bool]:
+        """Return the text of a value, and whether no semicolon may follow it."""
+        text, closed = to_qml(value), False
         if isinstance(value, Code):
             text = self._with_newlines(text)
             head = "X { p:\n"
@@ -502,19 +502,21 @@ class Document:
             expected = (len(head), len(head) + len(text))
             if len(root.items) > 1 or only.value_span != expected:
                 raise ArgumentError("value", str(value), "one expression, without blanks around it")
-        return text
+            closed = only.closed
+        return text, closed
 
     def _with_newlines(self, text: str) -> str:
         return _NEWLINE.sub(lambda _: self._newline, text)
 
     def _object_text(self, text: str) -> str:
         """Return a new object without indentation, checked."""
-        new = Document(self._with_newlines(text.strip("\ufeff")), "<new object>")
+        text = self._with_newlines(text.strip("\ufeff"))
+        new = Document(text, "<new object>", is_part=True)
         if new.imports or new._scan.pragmas:
             raise QmlSyntaxError("expected an object without imports", new.file)
         start = len(new.text) - len(new.text.lstrip())
         text = new._unindented(start, len(new.text.rstrip()), new.root.span.start)
-        return Document(text)._with_unit(self._unit)
+        return Document(text, is_part=True)._with_unit(self._unit)
 
     def _with_unit(self, unit: str) -> str:
         """Return the text of a new object with the indentation unit of a file."""
@@ -660,7 +662,7 @@ class Document:
         """Return a text with one object, indented; its first line is not."""
         if not indent or not _NEWLINE.search(block):
             return block
-        return Document(block)._shifted(0, len(block), "", indent)
+        return Document(block, is_part=True)._shifted(0, len(block), "", indent)
 
     # Insertions
 
@@ -690,7 +692,7 @@ class Document:
         )
 
     def _insert(
-        self, owner: Object, after: Member | Object | None, text: str, child: bool = False
+        self, owner: Object, after: Member | Object | None, text: str, closed: bool = False
     ) -> Document:
         """Insert a member or child behind an item, or as the first one."""
         behind = owner.body.start + 1 if after is None else after.span.end
@@ -698,14 +700,14 @@ class Document:
         newline = self._newline
         if ended:
             indent = self._child_indent(owner, after)
-            blank = newline if child and isinstance(after, Object) and self._spaced(owner) else ""
+            blank = newline if isinstance(after, Object) and self._spaced(owner) else ""
             return self._splice(
                 [(at, at, f"{blank}{newline}{indent}{self._indented(text, indent)}")]
             )
         if not _NEWLINE.search(text) and not self._is_open_ended(text):
             closing = self.text[follower] == "}"
-            new = f" {text}" if closing or child else f" {text};"
-            if after is not None and self.text[behind - 1] not in ";}":
+            new = f" {text}" if closing or closed else f" {text};"
+            if after is not None and not after.closed and self.text[behind - 1] != ";":
                 new = f";{new}"
             end = behind
             if after is None and closing and self._blanks(behind) == follower:
@@ -721,7 +723,9 @@ class Document:
             return self._splice([(behind, behind, f"{newline}{text}{newline}")])
         place = owner.items.index(after) if after is not None else -1
         owner = broken._same(owner)
-        return broken._insert(owner, owner.items[place] if after is not None else None, text, child)
+        return broken._insert(
+            owner, owner.items[place] if after is not None else None, text, closed
+        )
 
     def _insert_before(self, child: Object, text: str) -> Document:
         owner = self._holder(child)

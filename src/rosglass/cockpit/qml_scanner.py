@@ -24,7 +24,7 @@ _MOST_BRACKETS = 4096
 _MOST_OBJECTS = 256
 
 _END = r"\n\r\u2028\u2029"
-_BLANK = r" \t\v\f\xa0\ufeff\u1680\u2000-\u200a\u202f\u205f\u3000"
+_BLANK = r" \t\v\f\xa0\u1680\u2000-\u200a\u202f\u205f\u3000"
 _WORD = r"[$\w\u200c\u200d]"
 _ID = rf"(?:{_WORD}|\\u[\da-fA-F]{{4}}|\\u\{{[\da-fA-F]+\}})+"
 _TOKEN = re.compile(
@@ -108,6 +108,7 @@ class Member:
         modifiers: Such as ``readonly``.
         objects: The objects that are its value.
         group: Contents of ``anchors { ... }``.
+        closed: Whether it ends with a bracket that no semicolon may follow.
     """
 
     owner: Object
@@ -120,6 +121,7 @@ class Member:
     modifiers: tuple[str, ...] = ()
     objects: list[Object] = field(default_factory=list)
     group: Object | None = None
+    closed: bool = False
 
     @property
     def text(self) -> str:
@@ -171,6 +173,7 @@ class Object:
         parent: The object around it; None for the root. Groups are left out.
         member: The member whose value it is; None for a child.
         on: The property that ``Behavior on x {}`` modifies; empty without.
+        closed: True, as for members that end with a bracket.
         items: Members and children, in the order of the text.
         objects: Children and objects that are values, in the order of the text, those in groups
             included; each has this object as its parent.
@@ -183,6 +186,7 @@ class Object:
     parent: Object | None = field(default=None, repr=False)
     member: Member | None = field(default=None, repr=False)
     on: str = ""
+    closed: bool = True
     items: list[Member | Object] = field(default_factory=list, repr=False)
     objects: list[Object] = field(default_factory=list, repr=False)
 
@@ -256,26 +260,33 @@ class Scanner:
     Args:
         text: A whole file.
         file: Its name, for errors.
+        is_part: The text is an object of a file, which may be ``Behavior on x {}``.
 
     Raises:
         QmlSyntaxError: The text is not QML; line, column, and what was expected.
     """
 
-    def __init__(self, text: str, file: str = "<text>") -> None:
+    def __init__(self, text: str, file: str = "<text>", is_part: bool = False) -> None:
         self.text, self.file = text, file
         self.imports: list[Import] = []
         self.pragmas: list[Span] = []
         self.fixed: list[Span] = []
         self._lines: list[int] | None = None
-        at = self._header(0)
+        # A byte order mark is a part of the file, but not of its QML.
+        at = self._header(int(text.startswith("\ufeff")))
         at = self._annotations(at)
         found = _QUALIFIED.match(text, at)
         if found is None:
             self._fail(at, "an object such as Item { }")
-        brace = self._skip(found.end())[0]
+        end, on = found.end(), ""
+        _, token, _, after, _ = self._next(end)
+        if is_part and token == "on":
+            on, _, end = self._qualified(after, "a property after on")
+        brace = self._skip(end)[0]
         if not text.startswith("{", brace):
             self._fail(brace, f"{{ after {found[0]}")
         self.root, at = self._object(found[0], found.start(), brace)
+        self.root.on = on
         at = self._skip(at)[0]
         if at < len(text):
             self._fail(at, "the end of the file: it has one root object")
@@ -307,8 +318,11 @@ class Scanner:
             if found is None:
                 return at, ended
             if found.lastgroup in {"space", "comment"}:
+                # As in Qt, a line that ends inside a comment does not count.
+                ended = ended or (
+                    found.lastgroup == "space" and _LINE_END.search(found[0]) is not None
+                )
                 at = found.end()
-                ended = ended or _LINE_END.search(text, found.start(), at) is not None
             elif text.startswith("/*", at):
                 self._fail(at, "*/ at the end of the comment")
             else:
@@ -492,9 +506,22 @@ class Scanner:
             elif kind != "name" and token != ".":
                 self._fail(start, "{ of the class")
 
-    def _statement(self, at: int) -> int:
-        """Return the end of a statement, its semicolon included if it is not an expression."""
-        open_words: list[str] = []  # if and do whose statement is being read
+    def _statement(self, at: int) -> tuple[int, bool]:
+        """Return the end of a binding's value, and whether a semicolon may follow."""
+        kind, token, start, _, _ = self._next(at)
+        if token == "{":
+            return self._balanced(start), False
+        if token == ";":
+            return start, True
+        if kind != "name" or token not in _STATEMENTS:
+            return self._expression(start), True
+        if token not in {"if", "with", "switch", "try"}:
+            self._fail(start, "a value")
+        return self._nested_statement(start)
+
+    def _nested_statement(self, at: int) -> tuple[int, bool]:
+        """Return the end of a statement, and whether a semicolon may follow; without recursion."""
+        open_words: list[str] = []  # each if and do whose statement is being read
         while True:
             kind, token, start, after, _ = self._next(at)
             if kind == "name" and token in _BEFORE_CONDITION:
@@ -502,36 +529,34 @@ class Scanner:
                 if token == "if":
                     open_words.append(token)
                 continue
-            if token == "do" and kind == "name":
+            if kind == "name" and token == "do":
                 open_words.append(token)
                 at = after
                 continue
-            end = self._simple_statement(kind, token, start, after)
+            end, semicolon = self._simple_statement(kind, token, start, after)
             while open_words:
-                semicolon = self._next(end)
-                if semicolon[1] == ";":
-                    end = semicolon[3]
-                kind, token, start, after, _ = self._next(end)
                 word = open_words.pop()
+                behind = self._end(end) if semicolon else end
+                _, token, start, after, _ = self._next(behind)
                 if word == "do":
                     if token != "while":
                         self._fail(start, "while of the do before")
-                    end = self._parentheses(after, token)
+                    end, semicolon = self._parentheses(after, token), True
                 elif token == "else":
                     at = after
                     break
             else:
-                return end
+                return end, semicolon
 
-    def _simple_statement(self, kind: str, token: str, start: int, after: int) -> int:
+    def _simple_statement(self, kind: str, token: str, start: int, after: int) -> tuple[int, bool]:
         if token == "{":
-            return self._balanced(start)
+            return self._balanced(start), False
         if token == ";":
-            return start
+            return after, False
         if kind != "name" or token not in _STATEMENTS:
-            return self._expression(start)
+            return self._expression(start), True
         if token == "switch":
-            return self._block(self._parentheses(after, token), token)
+            return self._block(self._parentheses(after, token), token), False
         if token == "try":
             end = self._block(after, token)
             _, token, _, after, _ = self._next(end)
@@ -540,10 +565,11 @@ class Scanner:
                 after = self._balanced(start) if token == "(" else after
                 end = self._block(after, "catch")
                 _, token, _, after, _ = self._next(end)
-            return self._block(after, token) if token == "finally" else end
+            return (self._block(after, token) if token == "finally" else end), False
         _, token, _, _, ended = self._next(after)
         # A return alone; otherwise declarations are read like an expression with commas.
-        return after if ended or token in {";", "}"} else self._expression(after)
+        alone = ended or token in {";", "}"}
+        return (after if alone else self._expression(after)), True
 
     def _parentheses(self, at: int, word: str) -> int:
         at = self._skip(at)[0]
@@ -559,12 +585,12 @@ class Scanner:
 
     # ---- the header
 
-    def _end(self, at: int, needs_break: bool = True) -> int:
+    def _end(self, at: int) -> int:
         """Return the end of a member that ends at an offset, its semicolon included."""
         _, token, start, after, ended = self._next(at)
         if token == ";":
-            return after if not ended else at
-        if needs_break and not ended and token not in {"}", ""}:
+            return after
+        if not ended and token not in {"}", ""}:
             self._fail(start, "; or a line break")
         return at
 
@@ -627,16 +653,20 @@ class Scanner:
                 self._fail(at, f"at most {_MOST_OBJECTS} objects in each other")
             sign = text[at : at + 1]
             if isinstance(top, Member):
+                assert top.value_span is not None
                 if sign == "]":
-                    assert top.value_span is not None
                     at += 1
                     top.value_span = Span(top.value_span.start, at)
-                    at = self._end(at)
-                    top.span = Span(top.span.start, at)
+                    at = self._finish(top, at, True)
                     stack.pop()
-                elif sign == ",":
-                    at += 1
                 else:
+                    if top.value_span.end > top.value_span.start:
+                        if sign != ",":
+                            self._fail(at, ", or ] after an object of the list")
+                        at = self._skip(at + 1)[0]
+                        if text.startswith("]", at):
+                            continue
+                    top.value_span = Span(top.value_span.start, at)
                     word, first, at = self._qualified(at, "an object, or ] at the end of the list")
                     at = self._open(stack, word, first, at, "", top)
             elif sign == "}":
@@ -645,13 +675,9 @@ class Scanner:
                 stack.pop()
                 if top.member is not None and top.member.form != "list":
                     member = top.member
-                    member.value_span = Span(top.span.start, at)
-                    if member.form == "group":
-                        member.value_span = top.body
-                    at = self._end(at, needs_break=False)
-                    member.span = Span(member.span.start, at)
-            elif sign == ";":
-                at += 1
+                    is_group = member.form == "group"
+                    member.value_span = top.body if is_group else Span(top.span.start, at)
+                    at = self._finish(member, at, True)
             else:
                 at = self._member(stack, top, at)
         return root, at
@@ -764,9 +790,7 @@ class Scanner:
                 member.value_span = Span(body, end)
             elif self.text.startswith("(", self._skip(end)[0]):
                 end = self._balanced(self._skip(end)[0])
-        end = self._end(end, needs_break=member.form not in {"function", "enum"})
-        member.span = Span(member.span.start, end)
-        return end
+        return self._finish(member, end, member.form in {"function", "enum"})
 
     def _value(self, stack: list[Object | Member], member: Member, at: int) -> int:
         at = self._skip(at)[0]
@@ -778,6 +802,8 @@ class Scanner:
             if self.text.startswith("{", brace):
                 member.value_span = Span(at, at)
                 if listed:
+                    if member.type and not member.type.startswith("list<"):
+                        self._fail(at, f"list<{member.type}> as the type of a list of objects")
                     member.form = "list"
                     stack.append(member)
                     return first
@@ -787,8 +813,18 @@ class Scanner:
                 return self._open(stack, name, first, found.end(), "", member)
         if member.form == "component":
             self._fail(at, "an object after component")
-        end = self._statement(at)
+        end, semicolon = self._statement(at)
         member.value_span = Span(at, end)
-        end = self._end(end, needs_break=self.text[end - 1] not in {"}", ";"})
-        member.span = Span(member.span.start, end)
-        return end
+        return self._finish(member, end, not semicolon)
+
+    def _finish(self, member: Member, at: int, closed: bool) -> int:
+        """Return the end of a member whose value ends at an offset."""
+        # Declarations are stricter with lists, and more tolerant else.
+        member.closed = closed and not member.type.startswith("list<")
+        _, token, _, after, _ = self._next(at)
+        if member.closed:
+            at = after if member.type and token == ";" else at
+        else:
+            at = self._end(at)
+        member.span = Span(member.span.start, at)
+        return at
