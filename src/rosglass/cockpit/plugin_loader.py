@@ -148,11 +148,14 @@ class PluginLoader(QtQuick.QQuickItem):
         """Begin; Qt calls this when all properties are set."""
         super().componentComplete()
         self._is_complete = True
-        self._on_colors()
         self._runtime = runtime_of(self)
         if self._runtime is None or self._runtime.engine is None:
             return
         self._engine = self._runtime.engine
+        if not QT6:
+            self._restart()
+            return
+        self._on_colors()
         session = self._runtime.session
         self._detach = session.attach(
             self,
@@ -356,7 +359,7 @@ class PluginLoader(QtQuick.QQuickItem):
     # Its colours.
 
     def _on_colors(self) -> None:
-        engine, colors = self._engine or QtQml.qmlEngine(self), self.colors.toVariant()
+        engine, colors = self._engine, self.colors.toVariant()
         if not QT6 or engine is None or not isinstance(colors, dict):
             return
         # Popups, such as menus and dialogs, have the colours of the window.

@@ -78,9 +78,10 @@ class RqmlApi(QtCore.QObject):
         self._items = [one for one in self._items if is_alive(one)]
         self._items.append(item)
 
-    @Property("QVariantList", constant=True)  # type: ignore[arg-type]
-    def plugins(self) -> list[dict[str, Any]]:
-        """The plugins that can be loaded: id, name, group, path, singleInstance."""
+    #: The plugins that can be loaded: id, name, group, path, singleInstance.
+    plugins = Property("QVariantList", lambda self: self._listed(), constant=True)  # type: ignore[arg-type]
+
+    def _listed(self) -> list[dict[str, Any]]:
         return [
             {
                 "id": plugin.id,
