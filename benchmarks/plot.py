@@ -325,7 +325,7 @@ def run(role: str, plan: dict[str, Any], environment: dict[str, str], prefix: li
         env=os.environ | environment,
         capture_output=True,
         text=True,
-        timeout=180,
+        timeout=180 + plan.get("seconds", 0),
         check=False,
     )
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
