@@ -107,6 +107,34 @@ def test_lines_are_drawn_at_their_values(controls: Any, plot: Any, wait: Any) ->
     assert red not in shown.color_at(0.25, 0.75)
 
 
+def test_plot_follows_theme_and_size_in_the_same_frame(controls: Any, plot: Any, wait: Any) -> None:
+    publisher = controls.robot.create_publisher("/point", POINT)
+    shown = plot(
+        "Plot { property string mode; onModeChanged: Theme.mode = mode\n"
+        "property color panel: Theme.panel; window: 10; leftMin: 0; leftMax: 10; timeout: 0\n"
+        'paused: true; PlotSeries { path: "/point:point.x"; color: "#ff0000" } }'
+    )
+    wait(publisher.subscription_count)
+    for number in range(1001):
+        publisher.publish(**stamped(1_700_000_000 + number / 100, number / 100))
+    wait(lambda: shown.get("received") == 1001)
+    shown.data.toOldest()
+    red = 0xFFFF0000
+    wait(lambda: red in shown.color_at(0.55, 0.55))
+    dark = shown.item.property("panel").rgb()
+    assert dark in shown.color_at(0.25, 0.75)
+    try:
+        # No event is processed before the image.
+        shown.item.setProperty("mode", "bright")
+        bright = shown.item.property("panel").rgb()
+        assert bright != dark
+        assert bright in shown.color_at(0.25, 0.75)
+        shown.item.setWidth(shown.item.width() - 150)
+        assert red in shown.color_at(0.55, 0.55)
+    finally:
+        shown.item.setProperty("mode", "dark")
+
+
 def test_silence_and_nan_are_gaps(controls: Any, plot: Any, wait: Any) -> None:
     publisher = controls.robot.create_publisher("/point", POINT)
     shown = plot(

@@ -130,10 +130,17 @@ class PlotLines(QtQuick.QQuickItem):
             source.attach(self)
         self.sourceChanged.emit()  # type: ignore[attr-defined]
 
+    def updatePolish(self) -> None:
+        """Draw before the next frame of the window; called by Qt."""
+        if is_alive(self._source):
+            self._source.draw()
+
     @QtCore.Slot()
     def _on_size(self) -> None:
         if is_alive(self._source):
             self._source.redraw()
+            # No frame in which the rest of the window has another size or theme.
+            self.polish()
 
     def _on_background(self) -> None:
         self._drawn = None

@@ -460,6 +460,10 @@ class PlotData(Element):
 
     @Slot()
     def _on_frame(self) -> None:
+        self.draw()
+
+    def draw(self) -> None:
+        """Draw what has changed, at once."""
         view = self._view
         if not is_alive(view):
             self._timer.stop()
