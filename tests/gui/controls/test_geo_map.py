@@ -178,6 +178,26 @@ def test_moving_the_map_by_hand_ends_following(controls: Any, wait: Callable[...
     wait(lambda: camera.centerX == pytest.approx(scene.robotX))
 
 
+def test_texts_of_the_grid_grow_with_the_theme(controls: Any) -> None:
+    view = controls.show(
+        "GeoMap { anchors.fill: parent; property real size: 1; onSizeChanged: Theme.scale = size }"
+    )
+    view.setProperty("size", 2)
+    try:
+        (marks,) = (
+            item for item in controls.window.findChildren(QtCore.QObject) if hasattr(item, "paint")
+            and item.property("gridSize")
+        )  # fmt: skip
+        image = QtGui.QImage(400, 300, QtGui.QImage.Format.Format_RGB32)
+        painter = QtGui.QPainter(image)
+        marks.paint(painter)
+        size = painter.font().pixelSize()
+        painter.end()
+        assert size == 22
+    finally:
+        view.setProperty("size", 1)
+
+
 def test_missing_tiles_are_parts_of_coarser_ones(tmp_path: Path) -> None:
     from rosglass.controls.maps.tiles import TileKey
 

@@ -31,12 +31,12 @@ __all__ = ["GeoScene"]
 _TRACK_STEP_M, _JUMP_M = 0.5, 1000.0
 #: Standard deviations of the circle that holds 95 % of the positions.
 _SIGMAS_95 = 2.45
-#: Degrees between the lines of a grid, and pixels at least.
+#: Degrees between the lines of a grid, and heights of a text at least.
 _STEPS = [
     step * 10.0**power for power in range(-7, 2) for step in (1, 2, 5)
     if step * 10.0**power <= 30
 ]  # fmt: skip
-_LEAST_PX = 90
+_LEAST = 8.0
 _IDENTITY = Plane(1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 
 
@@ -242,8 +242,8 @@ class GeoScene(Element):
 
     # Painting.
 
-    def paint_under(self, painter: QtGui.QPainter, color: QtGui.QColor) -> None:
-        """Paint a grid of degrees where there are no tiles."""
+    def paint_under(self, painter: QtGui.QPainter, color: QtGui.QColor, size: float) -> None:
+        """Paint a grid of degrees, with texts of a height in pixels, where there are no tiles."""
         camera = self._map_camera()
         if camera is None or self.hasTiles:
             return
@@ -257,9 +257,12 @@ class GeoScene(Element):
         view = camera.to_screen()
         faint = QtGui.QColor(color)
         faint.setAlphaF(0.35)
-        degrees = _LEAST_PX / math.hypot(view.a, view.c) / EARTH_M * 180
+        degrees = _LEAST * size / math.hypot(view.a, view.c) / EARTH_M * 180
         step = next((one for one in _STEPS if one >= degrees), 30.0)
         digits = max(0, math.ceil(-math.log10(step) - 1e-9))
+        font = painter.font()
+        font.setPixelSize(max(1, round(size)))
+        painter.setFont(font)
         for first, last, is_latitude in ((west, east, False), (south, north, True)):
             for number in range(math.ceil(first / step), math.floor(last / step) + 1)[:200]:
                 value = number * step
@@ -271,6 +274,6 @@ class GeoScene(Element):
                 painter.setPen(faint)
                 painter.drawLine(a, b)
                 painter.setPen(color)
-                at = (4.0, a.y() - 3) if is_latitude else (a.x() + 3, camera.height - 28)
+                at = (4.0, a.y() - 3) if is_latitude else (a.x() + 3, camera.height - 2.3 * size)
                 text = _degrees(value, "NS" if is_latitude else "EW", digits)
                 painter.drawText(QtCore.QPointF(*at), text)

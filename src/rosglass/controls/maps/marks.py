@@ -32,6 +32,8 @@ class MapMarks(QtQuick.QQuickPaintedItem):
     #: Whether the track is painted.
     track = Writable(bool, True, then="update")
     gridColor = _color("gray")
+    #: Height of the grid's texts in pixels.
+    gridSize = Writable(float, 12.0, then="update")
 
     def __init__(self, parent: QtQuick.QQuickItem | None = None) -> None:
         super().__init__(parent)
@@ -61,7 +63,7 @@ class MapMarks(QtQuick.QQuickPaintedItem):
         view = camera.to_screen()
         painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
         if hasattr(scene, "paint_under"):
-            scene.paint_under(painter, self.gridColor)
+            scene.paint_under(painter, self.gridColor, self.gridSize)
         if self.track and len(scene.track.points) > 1:
             points = [QtCore.QPointF(x, y) for x, y in scene.track.points]
             paint_line(painter, QtGui.QPolygonF(points), view, self.trackColor)

@@ -143,6 +143,7 @@ LiveFrame {
             trackColor: Theme.accent
             pathColor: Theme.good
             gridColor: Theme.dim
+            gridSize: Theme.small
         }
         Rectangle {
             objectName: "circle"
