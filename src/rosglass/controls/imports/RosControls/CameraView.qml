@@ -245,6 +245,9 @@ FocusScope {
                 anchors.centerIn: parent
                 spacing: Theme.gap / 2
                 readonly property real most: Math.max(1, view.width - 6 * Theme.gap)
+                // In Qt 5, the implicit width of a wrapped text depends on its width.
+                TextMetrics { id: detailSize; font: detail.font; text: detail.text }
+                TextMetrics { id: reasonSize; font: reason.font; text: reason.text }
                 ThemeText {
                     objectName: "headline"
                     anchors.horizontalCenter: parent.horizontalCenter
@@ -262,9 +265,10 @@ FocusScope {
                     }
                 }
                 ThemeText {
+                    id: detail
                     objectName: "noSignalText"
                     anchors.horizontalCenter: parent.horizontalCenter
-                    width: Math.min(implicitWidth, banner.most)
+                    width: Math.min(Math.ceil(detailSize.advanceWidth) + 1, banner.most)
                     text: view.detail_
                     wrapMode: Text.Wrap
                     maximumLineCount: view.height > 120 * Theme.size ? 4 : 2
@@ -272,9 +276,10 @@ FocusScope {
                     font.pixelSize: Math.min(Theme.large, Math.max(Theme.small, view.width / 20))
                 }
                 ThemeText {
+                    id: reason
                     objectName: "reason"
                     anchors.horizontalCenter: parent.horizontalCenter
-                    width: Math.min(implicitWidth, banner.most)
+                    width: Math.min(Math.ceil(reasonSize.advanceWidth) + 1, banner.most)
                     visible: text !== "" && view.height > 120 * Theme.size
                     text: view.late ? qsTr("or the clocks of robot and operator differ by that much")
                         : Fields.bounded(view.problem || (view.received && view.unconnected_) || camera.problem)
