@@ -14,7 +14,7 @@ from rosglass.errors import Error, QmlError
 from rosglass.qml.engine.log import forget_repeats, log_engine_warnings
 from rosglass.qml.engine.watchdog import Watchdog
 from rosglass.qml.run.load_errors import error_list
-from rosglass.qml.run.modules import import_folder, install, interface_file, is_own_window
+from rosglass.qml.run.modules import import_folder, install, interface_file, is_own_window, locate
 from rosglass.qml.run.renderer_choice import imported_modules
 from rosglass.qt import QT6, QtCore, QtQml, Signal, address, is_alive
 
@@ -168,9 +168,16 @@ if QT6:
     _REGISTERED_BY["RosScene"] = "rosglass.scene.app.modules"
 
 
-def register_imports(file: Path, engine: QtQml.QQmlEngine) -> None:
-    """Register the types of those of our modules that a file, or one that it uses, imports."""
-    for module in sorted(imported_modules(file, engine.importPathList()) & _REGISTERED_BY.keys()):
+def register_imports(file: Path, engine: QtQml.QQmlEngine, text: str | None = None) -> None:
+    """Register the types of those of our modules that a file, or one that it uses, imports.
+
+    Args:
+        file: The file.
+        engine: The engine that loads it.
+        text: The text of the file, for an editor; None for what is in it.
+    """
+    found = imported_modules(file, engine.importPathList(), text)
+    for module in sorted(found & _REGISTERED_BY.keys()):
         import_module(_REGISTERED_BY[module]).register()
 
 
@@ -250,6 +257,7 @@ class LiveFile(QtCore.QObject):
         session: The node that the QML uses.
         watch: Emit :attr:`due` when a file in its folder or in `import_paths` changes.
         import_paths: Further folders with QML modules.
+        must_exist: Whether the file must exist; an editor's may not yet.
 
     Raises:
         QmlError: There is no such file or folder.
@@ -267,9 +275,11 @@ class LiveFile(QtCore.QObject):
         *,
         watch: bool = False,
         import_paths: Sequence[str | os.PathLike[str]] = (),
+        must_exist: bool = True,
     ) -> None:
         super().__init__()
-        self.path, self._session = interface_file(file), session
+        self.path = interface_file(file) if must_exist else locate(file)
+        self._session = session
         self._folders = [import_folder(path) for path in import_paths]
         #: The objects created last; None before the first.
         self.made: Made | None = None
@@ -336,13 +346,16 @@ class LiveFile(QtCore.QObject):
         self._deferred = bool(self._session.waiting_calls)
         return not self._deferred and not self._closed and is_alive(self.engine)
 
-    def create(self) -> Made:
+    def create(self, text: str | None = None) -> Made:
         """Create the interface from the current file; the previous one stays.
+
+        Args:
+            text: The text of the file, for an editor; None for what is in it.
 
         Raises:
             QmlError: The file has errors; the message lists them as ``file:line:column: text``.
         """
-        if not os.path.isfile(self.path):  # noqa: PTH113 - pathlib's may raise
+        if text is None and not os.path.isfile(self.path):  # noqa: PTH113 - pathlib's may raise
             raise QmlError(f"{self.path}: there is no such file")
         forget_repeats()
         if self.made is not None:
@@ -350,8 +363,13 @@ class LiveFile(QtCore.QObject):
         engine = self._new_engine() if self._used else self.engine
         self._used = True
         if not self._is_own:
-            register_imports(self.path, engine)
-        component = QtQml.QQmlComponent(engine, QtCore.QUrl.fromLocalFile(str(self.path)))
+            register_imports(self.path, engine, text)
+        url = QtCore.QUrl.fromLocalFile(str(self.path))
+        if text is None:
+            component = QtQml.QQmlComponent(engine, url)
+        else:
+            component = QtQml.QQmlComponent(engine)
+            component.setData(text.encode(), url)
         root = create(component, engine.rootContext())
         if root is None:
             errors = error_list(component.errors(), self.path, engine.importPathList())

@@ -99,15 +99,16 @@ def need_in_file(file: Path, import_paths: Sequence[str]) -> str:
     return ""
 
 
-def imported_modules(file: Path, import_paths: Sequence[str]) -> set[str]:
+def imported_modules(file: Path, import_paths: Sequence[str], text: str | None = None) -> set[str]:
     """Return the QML modules that a file imports, and those of the files that it uses.
 
     Args:
         file: The file.
         import_paths: Folders with QML modules.
+        text: Its text; None for what is in the file.
     """
-    files = _files(file, [Path(folder) for folder in import_paths])
-    return {name for _, text in files for name, _ in _MODULE.findall(text)}
+    files = _files(file, [Path(folder) for folder in import_paths], text)
+    return {name for _, found in files for name, _ in _MODULE.findall(found)}
 
 
 def imported_folders(file: Path, import_paths: Sequence[str]) -> Iterator[tuple[str, str, Path]]:
@@ -126,13 +127,16 @@ def imported_folders(file: Path, import_paths: Sequence[str]) -> Iterator[tuple[
             yield name, version, folder
 
 
-def _files(file: Path, import_paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
+def _files(
+    file: Path, import_paths: Sequence[Path], first: str | None = None
+) -> Iterator[tuple[Path, str]]:
     """Yield a file and the files it uses, from its folders and from modules, with their texts."""
     waiting, seen = [file], {file}
     folders: dict[Path, _Folder] = {}
     while waiting:
         path = waiting.pop()
-        text = _read(path)
+        text = _read(path) if first is None else first
+        first = None
         yield path, text
         places = [path.parent, *(_plain(path.parent / name) for name in _FOLDER.findall(text))]
         modules = _MODULE.findall(text)

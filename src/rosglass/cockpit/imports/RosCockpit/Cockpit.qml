@@ -41,7 +41,8 @@ Item {
     ]
 
     default property alias content: area.data
-    readonly property alias holder_: stage
+    readonly property Item holder_: stage
+    readonly property Item area_: area
     readonly property alias bar_: bar
 
     property Item maximized_: null
@@ -136,8 +137,10 @@ Item {
                 child.parent = stage
         }
         for (const child of Elements.list(stage.children)) {
-            if (child.element_ !== "page")
+            if (child.element_ !== "page") {
                 child.anchors.fill = stage
+                child.shown_ = true
+            }
         }
         pages = Elements.list(stage.children).filter(child => child.element_ === "page")
         windows = Elements.list(area.children).filter(child => child.element_ === "window")
@@ -166,7 +169,7 @@ Item {
         arrange()
         complete_ = true
         // After a handler of the layout, which may have its own name for the node.
-        Qt.callLater(function() { if (!Ros2.isInitialized()) Ros2.init(cockpit.nodeName) })
+        Qt.callLater(function() { if (cockpit && !Ros2.isInitialized()) Ros2.init(cockpit.nodeName) })
     }
 
     implicitWidth: 1024 * Theme.size

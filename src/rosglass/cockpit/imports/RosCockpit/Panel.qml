@@ -22,7 +22,7 @@ Item {
 
     // A single item fills the panel, unless it has anchors; several stay where they place themselves.
     default property alias content: body.data
-    readonly property alias holder_: body
+    readonly property Item holder_: body
     readonly property alias frame_: frame
 
     // Whether the keyboard is in it, or the hand was in it last.

@@ -10,7 +10,7 @@ Item {
 
     readonly property string element_: "window"
     readonly property Item cockpit_: Elements.cockpitOf(parent)
-    readonly property alias holder_: body
+    readonly property Item holder_: body
 
     property string title
     // Name of its screen; empty for the primary one, which also stands in for one that is not there.

@@ -67,8 +67,12 @@ Item {
         minimumWidth_ = vertical_ ? high : wide
         minimumHeight_ = vertical_ ? wide : high
         for (const child of all) {
-            if (child.shown_ !== undefined)
+            if (child.shown_ !== undefined) {
                 child.shown_ = only === null || child === only
+                // It may have been in tabs.
+                if (child.anchors.fill)
+                    child.anchors.fill = undefined
+            }
             // Its own `visible` may be a binding.
             else if (only !== null && child !== only)
                 child.x = -100000

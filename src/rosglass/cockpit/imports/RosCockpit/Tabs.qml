@@ -8,7 +8,7 @@ Item {
 
     readonly property string element_: "tabs"
     readonly property Item cockpit_: Elements.cockpitOf(parent)
-    readonly property alias holder_: area
+    readonly property Item holder_: area
 
     // Its share of a Split.
     property real share: 1
