@@ -43,7 +43,6 @@ _REGEX = re.compile(
     rf"[^\\/\[{_END}]*)*/[$\w]*"
 )
 _LINE_END = re.compile(rf"\r\n|[{_END}]")
-_QUALIFIED = re.compile(rf"(?!\d){_ID}(?:\s*\.\s*{_ID})*")
 _HANDLER = re.compile(r"on_*[^\W_a-z]")
 _CLOSING = {"(": ")", "[": "]", "{": "}", "${": "}"}
 _OPENING = frozenset("([{")
@@ -275,17 +274,15 @@ class Scanner:
         # A byte order mark is a part of the file, but not of its QML.
         at = self._header(int(text.startswith("\ufeff")))
         at = self._annotations(at)
-        found = _QUALIFIED.match(text, at)
-        if found is None:
-            self._fail(at, "an object such as Item { }")
-        end, on = found.end(), ""
+        name, start, end = self._qualified(at, "an object such as Item { }")
+        on = ""
         _, token, _, after, _ = self._next(end)
         if is_part and token == "on":
             on, _, end = self._qualified(after, "a property after on")
         brace = self._skip(end)[0]
         if not text.startswith("{", brace):
-            self._fail(brace, f"{{ after {found[0]}")
-        self.root, at = self._object(found[0], found.start(), brace)
+            self._fail(brace, f"{{ after {name}")
+        self.root, at = self._object(name, start, brace)
         self.root.on = on
         at = self._skip(at)[0]
         if at < len(text):
@@ -348,11 +345,13 @@ class Scanner:
         return token, start, end
 
     def _qualified(self, at: int, expected: str) -> tuple[str, int, int]:
-        at = self._skip(at)[0]
-        found = _QUALIFIED.match(self.text, at)
-        if found is None:
-            self._fail(at, expected)
-        return re.sub(r"\s", "", found[0]), at, found.end()
+        name, start, end = self._name(at, expected)
+        while True:
+            _, token, _, after, _ = self._next(end)
+            if token != ".":
+                return name, start, end
+            part, _, end = self._name(after, f"a name after {name}.")
+            name += f".{part}"
 
     def _template(self, at: int) -> tuple[int, bool]:
         """Return the end of a template's text, and whether an expression follows."""
@@ -619,11 +618,11 @@ class Scanner:
         else:
             name, _, end = self._qualified(name_at, "a module, or a path in quotation marks")
         found = Import(Span(start, end), name, is_path=kind == "string")
-        kind, token, _, after, ended = self._next(end)
-        if kind == "number" and not ended:
+        kind, token, _, after, _ = self._next(end)
+        if kind == "number":
             found.version, end = token, after
-            _, token, _, after, ended = self._next(end)
-        if token == "as" and not ended:
+            _, token, _, after, _ = self._next(end)
+        if token == "as":
             found.alias, _, end = self._name(after, "a name after as")
         end = self._end(end)
         found.span = Span(start, end)
@@ -792,25 +791,37 @@ class Scanner:
                 end = self._balanced(self._skip(end)[0])
         return self._finish(member, end, member.form in {"function", "enum"})
 
+    def _type_at(self, at: int) -> tuple[str, int]:
+        """Return the type of an object that starts at an offset, and its end; empty without one."""
+        name = ""
+        while True:
+            kind, token, _, end, _ = self._next(at)
+            if kind != "name":
+                return "", at
+            name += token
+            _, token, _, at, _ = self._next(end)
+            if token == "{" and name not in _NOT_TYPES:
+                return name, end
+            if token != ".":
+                return "", at
+            name += "."
+
     def _value(self, stack: list[Object | Member], member: Member, at: int) -> int:
         at = self._skip(at)[0]
         listed = self.text.startswith("[", at)
         first = self._skip(at + 1)[0] if listed else at
-        found = _QUALIFIED.match(self.text, first)
-        if found is not None and found[0] not in _NOT_TYPES:
-            brace = self._skip(found.end())[0]
-            if self.text.startswith("{", brace):
-                member.value_span = Span(at, at)
-                if listed:
-                    if member.type and not member.type.startswith("list<"):
-                        self._fail(at, f"list<{member.type}> as the type of a list of objects")
-                    member.form = "list"
-                    stack.append(member)
-                    return first
-                if member.form == "value":
-                    member.form = "object"
-                name = re.sub(r"\s", "", found[0])
-                return self._open(stack, name, first, found.end(), "", member)
+        name, end = self._type_at(first)
+        if name:
+            member.value_span = Span(at, at)
+            if listed:
+                if member.type and not member.type.startswith("list<"):
+                    self._fail(at, f"list<{member.type}> as the type of a list of objects")
+                member.form = "list"
+                stack.append(member)
+                return first
+            if member.form == "value":
+                member.form = "object"
+            return self._open(stack, name, first, end, "", member)
         if member.form == "component":
             self._fail(at, "an object after component")
         end, semicolon = self._statement(at)

@@ -407,7 +407,7 @@ def qml_files() -> list[Path]:
     """Return the QML files of this project and of Qt's own modules."""
     import PySide6
 
-    roots = [ROOT / "src", ROOT / "examples", ROOT / "tests", Path(PySide6.__path__[0])]
+    roots = [ROOT / "src", ROOT / "examples", Path(PySide6.__path__[0])]
     return [path for root in roots for path in sorted(root.rglob("*.qml"))]
 
 

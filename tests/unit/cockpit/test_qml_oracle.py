@@ -26,7 +26,7 @@ Found = tuple[str, str, str, str]
 def qml_files() -> list[Path]:
     import PySide6
 
-    roots = [ROOT / "src", ROOT / "examples", ROOT / "tests", Path(PySide6.__path__[0])]
+    roots = [ROOT / "src", ROOT / "examples", Path(PySide6.__path__[0])]
     roots.append(Path("/usr/lib/x86_64-linux-gnu/qt5/qml"))
     return [path for root in roots for path in sorted(root.rglob("*.qml"))]
 
