@@ -113,6 +113,8 @@ LiveFrame {
         spacing: 2
         boundsBehavior: Flickable.StopAtBounds
         model: parameters.rows
+        // A current row would take the focus from a field when rows appear.
+        currentIndex: -1
         T.ScrollBar.vertical: ThemeScrollBar { id: bar }
 
         delegate: Item {
