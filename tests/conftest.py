@@ -10,6 +10,7 @@ import subprocess
 import sys
 import zlib
 from collections import defaultdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import ports
@@ -132,6 +133,40 @@ def start_command_at() -> Iterator[Callable[..., subprocess.Popen[str]]]:
             [sys.executable, "-m", "rosglass", *arguments],
             env=os.environ | {"ROSGLASS_URL": url},
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture(scope="session")
+def rclpy_python() -> Path:
+    """The Python of real ROS 2 Jazzy nodes: rclpy over Fast DDS, without rosglass."""
+    python = Path(__file__).parent.parent / ".venv-rclpy/bin/python"
+    if not python.exists():
+        pytest.skip("rclpy is not installed: scripts/setup.sh test")
+    return python
+
+
+@pytest.fixture
+def start_rclpy_at(rclpy_python: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Start a program of rclpy in a ROS domain; killed after the test.
+
+    Its standard input and output are pipes of text lines; what it logs goes to standard error.
+    """
+    started = []
+
+    def start(
+        domain: int, script: Path, *arguments: str, **environment: str
+    ) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [str(rclpy_python), "-u", str(script), *arguments],
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain)} | environment,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         )  # fmt: skip
         started.append(process)
         return process

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import random
-import subprocess
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    import subprocess
     from collections.abc import Callable, Iterator
 
-ROOT = Path(__file__).parents[2]
 RESTARTS = 10
 #: As examples/parameters.qml shows a parameter.
 SLIDER = """
@@ -39,16 +37,8 @@ SLIDER = """
 class Robot:
     """A program of rclpy with the node ``/robot``."""
 
-    def __init__(self, domain: int, value: float, highest: float) -> None:
-        python = ROOT / ".venv-rclpy/bin/python"
-        if not python.exists():
-            pytest.skip("rclpy is not installed: scripts/setup.sh test")
-        script = Path(__file__).with_name("rclpy_parameters.py")
-        self._process = subprocess.Popen(
-            [str(python), "-u", str(script), str(value), str(highest)],
-            env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-        )  # fmt: skip
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self._process = process
         self.lines: list[str] = []
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
@@ -68,11 +58,12 @@ class Robot:
 
 
 @pytest.fixture
-def start(ros_domains: list[int]) -> Iterator[Callable[[float, float], Robot]]:
+def start(start_rclpy_at: Any, ros_domains: list[int]) -> Iterator[Callable[[float, float], Robot]]:
     started: list[Robot] = []
 
     def start(value: float, highest: float) -> Robot:
-        started.append(Robot(ros_domains[0], value, highest))
+        script = Path(__file__).with_name("rclpy_parameters.py")
+        started.append(Robot(start_rclpy_at(ros_domains[0], script, str(value), str(highest))))
         return started[-1]
 
     yield start

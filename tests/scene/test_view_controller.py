@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from conftest import SceneBench
 
 HERE = Path(__file__).parent
-RCLPY = HERE.parents[1] / ".venv-rclpy/bin/python"
 PACKAGE = "hector_rviz_plugins_msgs"
 #: The entry as ``rosglass rviz`` saves it.
 ENTRY = """
@@ -165,14 +164,12 @@ def test_robots_of_ros2_move_the_camera(dds_bench: Any, definitions: Path, caplo
         assert view.mode == 1
 
 
-def test_rclpy_knows_types_and_latched_topics(dds_bench: Any) -> None:
-    if not RCLPY.exists():
-        pytest.skip("rclpy is not installed: scripts/setup.sh test")
+def test_rclpy_knows_types_and_latched_topics(dds_bench: Any, rclpy_python: Path) -> None:
     bench, domain = dds_bench
     show(bench)
     control(bench).view.track("map")
     names = ("/hector_view_controller/move_eye", "/hector_view_controller/tracked_frame")
-    command = (str(RCLPY), "-u", str(HERE / "rclpy_view.py"), *names)
+    command = (str(rclpy_python), "-u", str(HERE / "rclpy_view.py"), *names)
     with Program(bench, *command, domain=domain) as robot:
         assert robot.next() == [f"{PACKAGE}/srv/MoveEye"]
         assert robot.next() == "map"

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rosglass.messages.message import Message
     from rosglass.messages.schema import Schema
 
-__all__ = ["ElementCodec", "MessageSequence", "record_type", "same_bytes"]
+__all__ = ["ElementCodec", "MessageSequence", "read_columns", "record_type", "same_bytes"]
 
 
 class ElementCodec(Protocol):
@@ -181,6 +181,23 @@ def _row(message: Message) -> tuple[Any, ...]:
         for member in message._schema__.members
         for value in (getattr(message, member.attr),)
     )
+
+
+def read_columns(elements: MessageSequence, *paths: str) -> np.ndarray:
+    """Return fields of all elements as numbers, (elements, fields), without decoding them.
+
+    Args:
+        elements: The elements, of constant size.
+        paths: Paths of the fields, e.g. ``position.x``.
+    """
+    rows = elements.array
+    out: np.ndarray = load_numpy().empty((len(rows), len(paths)))
+    for number, path in enumerate(paths):
+        column = rows
+        for name in path.split("."):
+            column = column[name]
+        out[:, number] = column
+    return out
 
 
 def record_type(schema: Schema, wire: Wire) -> np.dtype | None:

@@ -2,30 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
-
 
 @pytest.fixture
-def robot(ros_domains: list[int]) -> Any:
-    """A program of rclpy, see ``rclpy_robot.py``."""
-    python = ROOT / ".venv-rclpy/bin/python"
-    if not python.exists():
-        pytest.skip("rclpy is not installed: scripts/setup.sh test")
-    script = Path(__file__).with_name("rclpy_robot.py")
-    environment = os.environ | {"ROS_DOMAIN_ID": str(ros_domains[0])}
-    process = subprocess.Popen(
-        [str(python), str(script)], env=environment, stdin=subprocess.PIPE, text=True
-    )
-    yield process
-    process.kill()
-    process.communicate()
+def robot(start_rclpy_at: Any, ros_domains: list[int]) -> Any:
+    return start_rclpy_at(ros_domains[0], Path(__file__).with_name("rclpy_robot.py"))
 
 
 @pytest.mark.parametrize("url", ["dds"], indirect=True, scope="module")

@@ -132,36 +132,14 @@ def fastdds_program(
     return program
 
 
-@pytest.fixture(scope="session")
-def rclpy_python() -> Path:
-    """The Python of real ROS 2 Jazzy nodes: rclpy over Fast DDS, without rosglass."""
-    python = Path(__file__).parents[3] / ".venv-rclpy/bin/python"
-    if not python.exists():
-        pytest.skip("rclpy is not installed: scripts/setup.sh test")
-    return python
-
-
 @pytest.fixture
-def start_rclpy(rclpy_python: Path, dds_domain: int) -> Iterator[Callable[..., subprocess.Popen]]:
-    """Start a program of rclpy (``peers/NAME.py``) in the module's domain; killed after the test.
-
-    Its standard input and output are pipes of text lines; what it logs goes to standard error.
-    """
-    started: list[subprocess.Popen[str]] = []
-
-    def start(name: str, *arguments: str, **environment: str) -> subprocess.Popen[str]:
-        peer = subprocess.Popen(
-            [str(rclpy_python), "-u", str(PEERS / f"{name}.py"), *arguments],
-            env=os.environ | {"ROS_DOMAIN_ID": str(dds_domain)} | environment,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        started.append(peer)
-        return peer
-
-    yield start
-    for peer in started:
-        peer.kill()
-        peer.communicate()
+def start_rclpy(
+    start_rclpy_at: Callable[..., subprocess.Popen[str]], dds_domain: int
+) -> Callable[..., subprocess.Popen[str]]:
+    """Start a program of rclpy (``peers/NAME.py``) in the module's domain."""
+    return lambda name, *arguments, **environment: start_rclpy_at(
+        dds_domain, PEERS / f"{name}.py", *arguments, **environment
+    )
 
 
 @pytest.fixture(scope="session")

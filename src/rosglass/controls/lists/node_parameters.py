@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.parameters import ParameterDescriptor, ParameterType
 from rosglass.controls.lists.row_model import RowModel
 from rosglass.errors import ConversionError, Error
-from rosglass.qml.elements.element import Element
-from rosglass.qml.elements.parameter import ParameterLink, as_type
+from rosglass.qml.elements.parameter import ParameterElement, ParameterLink, as_type
 from rosglass.qml.engine.from_js import plain_from_js
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
 from rosglass.qml.engine.to_js import exact
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.qml.elements.parameter import Reading
     from rosglass.qml.engine.runtime import Runtime
-    from rosglass.qml.engine.session import Session
 
 __all__ = ["NodeParameters"]
 
@@ -138,18 +136,14 @@ _ROLES: dict[str, Callable[[_Row], Any]] = {
 }
 
 
-class NodeParameters(Element):
+class NodeParameters(ParameterElement):
     """All parameters of a node. See its page in ``docs/controls``."""
 
     #: The node refused a value of a parameter, for this reason.
     rejected = Signal(str, str, arguments=["name", "reason"])
 
-    #: Full name of the node, in ROS 1 any namespace of the parameter server.
-    nodeName = Writable(str, "")
     #: Part of a name; only parameters whose names contain it are rows.
     filter = Writable(str, "", then="_show_rows")
-    #: Whether the node is available and its parameters are known.
-    ready = ReadOnly(bool, False)
     #: Number of parameters, and of the rows.
     total = ReadOnly(int, 0)
     count = ReadOnly(int, 0)
@@ -157,7 +151,6 @@ class NodeParameters(Element):
     undoText = ReadOnly(str, "")
 
     _HOLDS = ("_known", "_history")
-    _endpoint: ParameterLink | None
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -279,12 +272,6 @@ class NodeParameters(Element):
         self._set_problem("")
         self._set_endpoint(ParameterLink.join_all(session, node, name, self, self._on_readings))
 
-    def _dispose(self, session: Session, endpoint: ParameterLink) -> None:  # noqa: ARG002
-        endpoint.leave(self)
-
-    def _on_created(self, endpoint: ParameterLink) -> None:  # noqa: ARG002 - the base's signature
-        self._on_tick()
-
     def _on_closed(self, endpoint: ParameterLink | None) -> None:  # noqa: ARG002 - as above
         self._known, self._history = {}, []
         self._marked.clear()
@@ -293,19 +280,8 @@ class NodeParameters(Element):
         self._show_undo()
 
     @Slot()
-    def _on_graph(self) -> None:
-        if self._endpoint is not None:
-            self._endpoint.on_graph()
-
-    @Slot()
     def _on_tick(self) -> None:
-        link = self._endpoint
-        if link is None:
-            return
-        link.on_tick()
-        self._set_problem(link.problem)
-        if link.problem or not link.ready:
-            report(self, ready=False)
+        super()._on_tick()
         now = self._steady()
         ended = [name for name, until in self._marked.items() if now >= until]
         for name in ended:

@@ -22,6 +22,7 @@ from rosglass.controls.maps.grid import GridReader, theme_colors
 from rosglass.controls.maps.tiles import TileLayer
 from rosglass.errors import Error, TransformException
 from rosglass.images.grid_colors import grid_colors
+from rosglass.messages.sequences import read_columns
 from rosglass.qml.elements.element import TopicElement
 from rosglass.qml.elements.message_queue import MessageQueue, QueuedMessage, Subscriptions
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
@@ -357,18 +358,6 @@ class Shape(NamedTuple):
     warning: str = ""
 
 
-def _columns(elements: Any, *paths: str) -> NDArray[np.float64]:
-    """Return fields of all elements of a message's array, (n, fields)."""
-    rows = elements.array
-    out = np.empty((len(rows), len(paths)))
-    for number, path in enumerate(paths):
-        column = rows
-        for name in path.split("."):
-            column = column[name]
-        out[:, number] = column
-    return out
-
-
 def _finite(points: NDArray[np.float64], what: str) -> Shape:
     good = np.isfinite(points).all(axis=1) & (np.abs(points) < 1e9).all(axis=1)
     bad = int(len(points) - good.sum())
@@ -414,7 +403,7 @@ def read_path(message: Any) -> Shape:
 def read_outline(message: Any) -> Shape:
     """Read a ``geometry_msgs/PolygonStamped``."""
     _check_count(len(message.polygon.points), _MOST_POSES, "points")
-    return _finite(_columns(message.polygon.points, "x", "y"), "points")
+    return _finite(read_columns(message.polygon.points, "x", "y"), "points")
 
 
 def read_particles(message: Any) -> Shape:
@@ -422,7 +411,7 @@ def read_particles(message: Any) -> Shape:
     is_cloud = "particles" in message
     elements, path = (message.particles, "pose.") if is_cloud else (message.poses, "")
     _check_count(len(elements), _MOST_POINTS, "poses")
-    return _finite(_columns(elements, f"{path}position.x", f"{path}position.y"), "poses")
+    return _finite(read_columns(elements, f"{path}position.x", f"{path}position.y"), "poses")
 
 
 def read_geo_path(message: Any) -> Shape:

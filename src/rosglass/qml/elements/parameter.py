@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rosglass.qt import QtCore
 
 
-__all__ = ["Parameter", "ParameterLink", "Reading", "as_type"]
+__all__ = ["Parameter", "ParameterElement", "ParameterLink", "Reading", "as_type"]
 
 _log = logging.getLogger("rosglass.qml")
 #: Seconds that a node has to answer.
@@ -329,7 +329,40 @@ def as_type(value: Any, wanted: ParameterType) -> Any:
     return value
 
 
-class Parameter(Element):
+class ParameterElement(Element):
+    """Base of elements for the parameters of a node."""
+
+    nodeName = Writable(str, "")
+    #: Whether the node is available, and what is shown of it is known.
+    ready = ReadOnly(bool, False)
+
+    _endpoint: ParameterLink | None
+    #: Why the node returns no value.
+    _missing = ""
+
+    def _dispose(self, session: Session, endpoint: ParameterLink) -> None:  # noqa: ARG002
+        endpoint.leave(self)
+
+    def _on_created(self, endpoint: ParameterLink) -> None:  # noqa: ARG002 - the base's signature
+        self._on_tick()
+
+    @Slot()
+    def _on_graph(self) -> None:
+        if self._endpoint is not None:
+            self._endpoint.on_graph()
+
+    @Slot()
+    def _on_tick(self) -> None:
+        link = self._endpoint
+        if link is None:
+            return
+        link.on_tick()
+        self._set_problem(link.problem or self._missing)
+        if link.problem or not link.ready:
+            report(self, ready=False)
+
+
+class Parameter(ParameterElement):
     """One parameter of a node. See its page in ``docs/elements``."""
 
     #: The node rejected a value, for this reason.
@@ -337,14 +370,12 @@ class Parameter(Element):
     valueChanged = Signal()
     descriptionChanged = Signal()
 
-    nodeName = Writable(str, "")
     name = Writable(str, "")
     value = Writable(
         QJSValue,
         read="_get_value",
         write="_set_value",
     )
-    ready = ReadOnly(bool, False)
     pending = ReadOnly(bool, False)
     type = ReadOnly(str, read="_get_type", notify="descriptionChanged")
     description = ReadOnly(
@@ -367,8 +398,6 @@ class Parameter(Element):
         QJSValue, read=lambda self: self._get_bound("step"), notify="descriptionChanged"
     )
 
-    _endpoint: ParameterLink | None
-
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
@@ -377,8 +406,6 @@ class Parameter(Element):
         self._descriptor: ParameterDescriptor | None = None
         #: Number of requested changes without a reply.
         self._writes = 0
-        #: Why the node returns no value.
-        self._missing = ""
 
     @property
     def label(self) -> str:
@@ -454,33 +481,12 @@ class Parameter(Element):
             ParameterLink.join(session, node, node_name, self, name, self._on_reading)
         )
 
-    def _dispose(self, session: Session, endpoint: ParameterLink) -> None:  # noqa: ARG002
-        endpoint.leave(self)
-
-    def _on_created(self, endpoint: ParameterLink) -> None:  # noqa: ARG002 - the base's signature
-        self._on_tick()
-
     def _on_closed(self, endpoint: ParameterLink | None) -> None:  # noqa: ARG002 - as above
         self._missing = ""
         # Replies to pending writes will never arrive.
         self._writes = 0
         report(self, ready=False, pending=False)
         self._show(None)
-
-    @Slot()
-    def _on_graph(self) -> None:
-        if self._endpoint is not None:
-            self._endpoint.on_graph()
-
-    @Slot()
-    def _on_tick(self) -> None:
-        link = self._endpoint
-        if link is None:
-            return
-        link.on_tick()
-        self._set_problem(link.problem or self._missing)
-        if link.problem or not link.ready:
-            report(self, ready=False)
 
     def _on_reading(self, reading: Reading) -> None:
         link = self._endpoint

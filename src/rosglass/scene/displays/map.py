@@ -11,9 +11,9 @@ import numpy as np
 from rosglass.comm.qos import QoS, Reliability
 from rosglass.errors import Error
 from rosglass.images.grid_colors import grid_colors
+from rosglass.messages.sequences import read_columns
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.scene.configs.settings import Setting, rgb_of
-from rosglass.scene.displays.shapes import read_columns
 from rosglass.scene.displays.topic_display import TopicDisplay
 from rosglass.scene.render.arrays import are_drawable, check_numbers
 from rosglass.scene.render.drawing import MapImage, Points

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error
+from rosglass.messages.sequences import read_columns
 from rosglass.scene.configs.settings import Setting, rgb_of
-from rosglass.scene.displays.shapes import ALONG, ArrowShapes, AxesShapes, read_columns
+from rosglass.scene.displays.shapes import ALONG, ArrowShapes, AxesShapes
 from rosglass.scene.displays.topic_display import HistoryDisplay, TopicDisplay
 from rosglass.scene.render.arrays import check_numbers
 from rosglass.scene.render.drawing import Lines, Mesh

@@ -14,9 +14,8 @@ from rosglass.scene.render.scene_tree import Group
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from rosglass.messages import MessageSequence
 
-__all__ = ["ALONG", "ArrowShapes", "AxesShapes", "read_columns"]
+__all__ = ["ALONG", "ArrowShapes", "AxesShapes"]
 
 #: Turns z, along which cylinders and cones stand, to x, y and z.
 ALONG = np.array(
@@ -27,23 +26,6 @@ ALONG = np.array(
     ]
 )
 _COLORS = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]], np.float32)
-
-
-def read_columns(elements: MessageSequence, *paths: str) -> NDArray[np.float64]:
-    """Return fields of all elements of a message's array, (n, fields).
-
-    Args:
-        elements: The elements, of constant size.
-        paths: Paths of the fields, e.g. ``position.x``.
-    """
-    rows = elements.array
-    out = np.empty((len(rows), len(paths)))
-    for number, path in enumerate(paths):
-        column = rows
-        for name in path.split("."):
-            column = column[name]
-        out[:, number] = column
-    return out
 
 
 def _along(
