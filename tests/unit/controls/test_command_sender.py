@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from typing import Any
 
 from waiting import eventually
@@ -48,5 +50,30 @@ def test_zeros_are_sent_for_as_long_as_they_are_dropped(monkeypatch: Any) -> Non
         # Without the outage, 5 are sent.
         eventually(lambda: publisher.sent.count(0.0) >= 10)
         assert publisher.sent[-1] == 0.0
+    finally:
+        sender.close()
+
+
+def test_command_is_not_sent_when_the_process_was_stopped_on_its_way() -> None:
+    """Between the decision to send it and the publisher, where a thread waits for its turn."""
+    publisher, stopped = StalledPublisher(), 0.0
+    decided, continued = threading.Event(), threading.Event()
+
+    def compose(velocity: Velocity, _: str) -> dict[str, Any]:
+        if velocity.forward:
+            decided.set()
+            assert continued.wait(30)
+        return {"speed": velocity.forward}
+
+    sender = CommandSender(publisher, compose, lambda _: None)  # type: ignore[arg-type]
+    sender._clock = lambda: time.monotonic() + stopped
+    sender.limits = Limits(Velocity(forward=1.0))
+    try:
+        sender.begin(1, 0, 0)
+        assert decided.wait(30)
+        stopped = 1.0
+        continued.set()
+        eventually(lambda: len(publisher.sent) >= 3)
+        assert not any(publisher.sent)
     finally:
         sender.close()

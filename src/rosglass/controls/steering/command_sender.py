@@ -260,17 +260,20 @@ class CommandSender(Handle):
                     self._changed.wait(None if due is None else max(0.0, due - now))
                     continue
                 velocity = self._advance(now)
-            self._send(velocity)
+            self._send(velocity, now)
             with self._changed:
                 reason, self._unreported = self._unreported, ""
             if reason:
                 with guarded(_log, "%s: a callback failed", self.publisher.topic):
                     self._on_halt(reason)
 
-    def _send(self, velocity: Velocity) -> None:
+    def _send(self, velocity: Velocity, decided_at: float) -> None:
         with guarded(_log, "internal error: no command was sent on %s", self.publisher.topic):
             try:
-                self.publisher.publish(self._compose(velocity, self.frame))
+                message = self._compose(velocity, self.frame)
+                # This thread or the process may have stood still since then.
+                if not any(velocity) or self._clock() - decided_at < FRESH_S:
+                    self.publisher.publish(message)
                 self.problem = ""
             except Error as error:
                 self.problem = str(error)
