@@ -11,6 +11,7 @@ from waiting import nothing_happens
 
 from rosglass.comm.graph import ConnectionState
 from rosglass.controls.steering import command_sender
+from rosglass.controls.steering.heartbeat import Heartbeat
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -344,6 +345,73 @@ def test_a_lost_connection_halts_and_gets_its_zeros_later(drive: Drive) -> None:
     assert not drive.silent()
     drive.controls.bench.session.node.set_status(ConnectionState.CONNECTED, "")
     drive.stops("the robot is not connected: the cable is out")
+
+
+def test_robot_that_falls_silent_halts(drive: Drive) -> None:
+    """Its commands may still be received, and the connection may not have noticed an outage yet."""
+    odometry = drive.controls.robot.create_publisher("/odom", "nav_msgs/msg/Odometry")
+    other = drive.controls.robot.create_publisher("/bert/odom", "nav_msgs/msg/Odometry")
+    drive.command.heartbeatTimeout = 2000
+    drive.wait(odometry.subscription_count)
+    drive.go()  # although nothing has been received yet
+    drive.set("holdA", False)
+
+    def receives() -> bool:
+        odometry.publish()
+        other.publish()
+        return drive.command._robot.age >= 0 and not drive.command._robot.stale
+
+    def halts() -> bool:
+        """A busy machine may halt it for another reason before."""
+        drive.wait(receives)
+        drive.go()
+        drive.wait(lambda: not drive.command.active)
+        return any("the robot sends no data: /odom is 2." in one for one in drive.reasons())
+
+    drive.wait(halts)
+    drive.wait(lambda: drive.robot.zeros >= 10, "zeros for as long as it is silent")
+    assert not other.subscription_count()
+    drive.set("holdA", False)
+    drive.set("holdA", True)
+    drive.wait(lambda: "the robot sends no data" in drive.command.problem)
+    drive.wait(receives)
+    drive.wait.settled(drive.controls.engine_session)
+    assert not drive.command.active, "it has to be let go first"
+    drive.set("holdA", False)
+    drive.command.heartbeat = "/pulse"
+    drive.go()  # as it was never received
+    drive.set("holdA", False)
+    drive.command.heartbeat = ""
+    drive.wait(receives)
+    drive.wait(lambda: drive.command._robot.stale)
+    drive.command.heartbeatTimeout = 0
+    drive.go()
+
+
+@pytest.mark.parametrize(
+    ("commands", "found", "chosen"),
+    [
+        ("/cmd_vel", ["/anna/odom", "/odom"], "/odom"),
+        ("/cmd_vel", ["/camera/odom/sample", "/odometry/filtered"], "/odometry/filtered"),
+        ("/anna/cmd_vel", ["/anna/base/odom", "/odom", "/bert/odom"], "/anna/base/odom"),
+        ("/anna/base/cmd_vel", ["/anna/odom", "/odom", "/anna/arm/odom"], "/anna/odom"),
+        ("/base/cmd_vel", ["/odom", "/bert/odom"], "/odom"),
+        ("/anna/cmd_vel", ["/bert/odom"], ""),
+        ("/anna/cmd_vel", ["/annabel/odom"], ""),
+    ],
+)
+def test_nearest_odometry_shows_whether_the_robot_sends(
+    app: Any, commands: str, found: list[str], chosen: str
+) -> None:
+    class Graph:
+        def topics(self) -> dict[str, set[str]]:
+            return {commands: {"geometry_msgs/msg/Twist"}} | {
+                name: {"nav_msgs/msg/Odometry"} for name in found
+            }
+
+    heartbeat = Heartbeat()
+    heartbeat._commands = commands
+    assert heartbeat._select(Graph()) == chosen  # type: ignore[arg-type]
 
 
 def test_robot_that_leaves_halts_although_others_listen(drive: Drive) -> None:

@@ -10,6 +10,7 @@ from weakref import ref
 
 from rosglass.comm.qos import QoS
 from rosglass.controls.steering.command_sender import CommandSender, Limits, Velocity
+from rosglass.controls.steering.heartbeat import Heartbeat
 from rosglass.controls.steering.in_front import FocusWatch, find_item, obstruction, popup_layer
 from rosglass.errors import Error, UnsupportedError
 from rosglass.interfaces.names import join_name
@@ -88,7 +89,7 @@ class TwistCommand(Element):
     commands is judged on the thread of the :class:`CommandSender`, which also publishes them.
     """
 
-    _HOLDS = ("_inputs", "_steers")
+    _HOLDS = ("_inputs", "_steers", "_robot")
     _refusal: str
 
     #: Steering has ended by another cause than the hand that let go: the reason.
@@ -118,6 +119,10 @@ class TwistCommand(Element):
     obstacle = Writable(str, "", then="_check")
     #: Whether the robot answers: zeros are repeated until it has for a second.
     reachable = Writable(bool, True, then="_on_connection")
+    #: The topic that must be fresh for the robot to be driven, once it was received; empty for its
+    #: odometry. And the milliseconds after which it is not; 0 to drive without it.
+    heartbeat = Writable(str, "", then="_follow_robot")
+    heartbeatTimeout = Writable(int, 1000, within(0, 60_000, "ms"), then="_follow_robot")
     #: Whether an input steers now, and its name.
     active = ReadOnly(bool, False)
     holder = ReadOnly(str, "")
@@ -133,6 +138,8 @@ class TwistCommand(Element):
         self._inputs: dict[int, _Input] = {}
         self._steers: _Input | None = None
         self._focus = FocusWatch(weak_callback(self._on_focus_lost))
+        #: Receives the robot's data; None until there is a session.
+        self._robot: Heartbeat | None = None
         #: The type of the topic's subscribers.
         self._found = _TWIST
 
@@ -221,8 +228,9 @@ class TwistCommand(Element):
 
     def _reason_against(self, one: _Input) -> str:
         """Return why an input may not steer now; empty if it may."""
-        if self.obstacle:
-            return self.obstacle
+        reason = self.obstacle or self._silence()
+        if reason:
+            return reason
         other = next((i for i in self._inputs.values() if i.held and i is not one), None)
         if other is not None and self._steers is not one:
             return f"{other.name} is held"
@@ -232,6 +240,9 @@ class TwistCommand(Element):
         if self._endpoint is None:
             return self._problem or self._disconnected() or "the topic is not advertised yet"
         return self._disconnected() or obstruction(one.shown)
+
+    def _silence(self) -> str:
+        return self._robot.silence() if self._robot is not None else ""
 
     def _begin(self, one: _Input, wanted: tuple[float, float, float]) -> None:
         self._watch_window(one)
@@ -373,6 +384,8 @@ class TwistCommand(Element):
         app.aboutToQuit.connect(self._on_quit)
         if self._session is not None:
             self._session.reloading.connect(self._on_reload)
+        self._robot = Heartbeat(self, self._runtime)
+        self._robot.staleChanged.connect(self._on_connection)
         self._cleanup["focus"] = self._focus.stop
         if isinstance(app, QtGui.QGuiApplication):
             app.focusWindowChanged.connect(self._check)
@@ -410,6 +423,16 @@ class TwistCommand(Element):
         sender.limits = Limits(fastest, self.acceleration, self.deceleration, turn)
         sender.frame = self.frame
 
+    def _update(self) -> None:
+        super()._update()
+        self._follow_robot()
+
+    @Slot()
+    def _follow_robot(self) -> None:
+        if self._robot is not None:
+            commands = self._config[1] if self._config is not None else ""
+            self._robot.follow(commands, self.heartbeat, self.ns, self.heartbeatTimeout)
+
     def _wanted(self) -> tuple[Node, str, str] | None:
         node = self.node
         if node is None or not self.topic:
@@ -446,7 +469,7 @@ class TwistCommand(Element):
 
     def _on_created(self, endpoint: CommandSender) -> None:
         self._configure()
-        endpoint.connected = self.reachable and not self._disconnected()
+        endpoint.connected = self.reachable and not self._disconnected() and not self._silence()
         with suppress(UnsupportedError):  # a recording, which has no subscribers
             endpoint.publisher.on_matched(weak_callback(self._on_matched), self._executor)
         self._set_problem("")
@@ -472,7 +495,9 @@ class TwistCommand(Element):
 
     @Slot()
     def _on_connection(self) -> None:
-        lost = self._disconnected()
+        if not is_alive(self):
+            return
+        lost = self._disconnected() or self._silence()
         if self._endpoint is not None:
             self._endpoint.connected = self.reachable and not lost
         if lost:
