@@ -291,3 +291,14 @@ def test_stick_without_a_command_has_one_of_its_own(controls: Any, wait: Any) ->
     wait(lambda: drive.messages and drive.messages[-1][0] > 0.1)
     drive.mouse("release", 100, 10)
     drive.stands()
+
+
+def test_stick_is_round_whatever_its_shape(controls: Any, wait: Any) -> None:
+    drive = Drive(controls, wait, "DriveStick { anchors.fill: parent }", width=400, height=200)
+    drive.mouse("press", 200, 100)
+    # Its reach is that of a stick of 200 x 200.
+    drive.mouse("move", 138, 100)
+    assert drive.item.property("leftward") == pytest.approx(1)
+    drive.mouse("move", 200, 69)
+    assert drive.item.property("forward") == pytest.approx(0.5)
+    drive.mouse("release", 200, 69)

@@ -28,7 +28,9 @@ Item {
 
     property point thumb_: Qt.point(0, 0)
     property bool steers_: false
-    readonly property real reach_: Math.max(1, (width - knob.width) / 2)
+    // It is round, whatever its shape.
+    readonly property real side_: Math.min(width, height)
+    readonly property real reach_: Math.max(1, (side_ - knob.width) / 2)
     readonly property color tint_: !held ? Theme.faint : active ? Theme.accent : Theme.bad
 
     implicitWidth: 170 * Theme.size
@@ -82,7 +84,9 @@ Item {
     }
 
     Rectangle {
-        anchors.fill: parent
+        anchors.centerIn: parent
+        width: stick.side_
+        height: width
         radius: width / 2
         color: Theme.shade
         border { width: 2; color: stick.tint_ }
@@ -91,8 +95,8 @@ Item {
     Repeater {
         model: 4
         Text {
-            x: stick.width / 2 - width / 2 + Math.sin(index * Math.PI / 2) * (stick.width / 2 - height)
-            y: stick.height / 2 - height / 2 - Math.cos(index * Math.PI / 2) * (stick.height / 2 - height)
+            x: stick.width / 2 - width / 2 + Math.sin(index * Math.PI / 2) * (stick.side_ / 2 - height)
+            y: stick.height / 2 - height / 2 - Math.cos(index * Math.PI / 2) * (stick.side_ / 2 - height)
             text: "▲"
             rotation: index * 90
             color: Theme.dim
@@ -101,7 +105,7 @@ Item {
     }
     Rectangle {
         anchors.centerIn: parent
-        width: parent.width * 0.52
+        width: stick.side_ * 0.52
         height: width
         radius: width / 2
         color: "transparent"
@@ -113,7 +117,7 @@ Item {
         // Animated in units of the stick, so that it does not lag behind when it is laid out.
         property real leftwards: stick.held ? stick.leftward : 0
         property real forwards: stick.held ? stick.forward : 0
-        width: stick.width * 0.38
+        width: stick.side_ * 0.38
         height: width
         radius: width / 2
         x: (stick.width - width) / 2 - leftwards * stick.reach_
@@ -128,8 +132,8 @@ Item {
     }
     ThemeText {
         objectName: "reason"
-        anchors { horizontalCenter: parent.horizontalCenter; bottom: parent.bottom; bottomMargin: parent.height * 0.14 }
-        width: Math.min(implicitWidth, parent.width * 0.8)
+        anchors { horizontalCenter: parent.horizontalCenter; bottom: parent.bottom; bottomMargin: (parent.height - stick.side_) / 2 + stick.side_ * 0.14 }
+        width: Math.min(implicitWidth, stick.side_ * 0.8)
         visible: stick.held && !stick.active
         text: stick.command ? stick.command.problem : ""
         color: Theme.bad
