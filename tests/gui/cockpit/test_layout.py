@@ -272,3 +272,26 @@ def test_commands_halt_at_every_change(layouts: Any, change: str) -> None:
     assert not command.property("active")
     layouts.wait(lambda: received[-1] == 0)
     subscription.close()
+
+
+def test_a_framed_control_leaves_title_and_status_to_its_panel(layouts: Any) -> None:
+    layouts.show(
+        """Page {
+            Panel { objectName: "alone"
+                LiveFrame { title: "Battery"; problem: "no such topic" } }
+            Panel { objectName: "plain"; title: "P"
+                LiveFrame { objectName: "content"; framed: false; problem: "lost" } }
+            Tabs {
+                Panel { title: "Good"; LiveFrame {} }
+                Panel { title: "Bad"; LiveFrame { problem: "no such topic" } } } }"""
+    )
+    alone, plain = layouts.find("alone"), layouts.find("plain")
+    assert (alone.property("title_"), alone.property("status_")) == ("Battery", "no such topic")
+    assert alone.property("wrong_")
+    assert not layouts.find("aside", alone.property("only_")).isVisible()
+    # Unframed, it shows them itself.
+    assert (plain.property("status_"), plain.property("wrong_")) == ("", False)
+    assert layouts.find("aside", layouts.find("content")).isVisible()
+    # A tab that is not shown says it, too.
+    assert not layouts.find("tab0").property("wrong")
+    assert layouts.find("tab1").property("wrong")

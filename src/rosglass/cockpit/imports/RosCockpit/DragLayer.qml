@@ -299,9 +299,9 @@ Item {
             id: label
             anchors { fill: parent; leftMargin: Theme.gap; rightMargin: Theme.gap }
             verticalAlignment: Text.AlignVCenter
-            text: !layer.panel ? "" : layer.outside ? qsTr("%1: own window").arg(layer.panel.title)
-                : layer.target && layer.target.element_ === "page" && layer.edge === "center" ? qsTr("%1: to %2").arg(layer.panel.title).arg(layer.target.title)
-                : layer.panel.title
+            text: !layer.panel ? "" : layer.outside ? qsTr("%1: own window").arg(layer.panel.title_)
+                : layer.target && layer.target.element_ === "page" && layer.edge === "center" ? qsTr("%1: to %2").arg(layer.panel.title_).arg(layer.target.title)
+                : layer.panel.title_
         }
     }
     Rectangle {
@@ -315,7 +315,7 @@ Item {
         ThemeText {
             id: hint
             anchors.centerIn: parent
-            text: layer.resized ? qsTr("Size of %1: arrow keys; Enter when done").arg(layer.resized.title) : ""
+            text: layer.resized ? qsTr("Size of %1: arrow keys; Enter when done").arg(layer.resized.title_) : ""
         }
     }
 }

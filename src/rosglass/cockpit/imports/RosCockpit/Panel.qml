@@ -37,6 +37,13 @@ Item {
     property Item only_: null
     property bool complete_: false
     readonly property bool empty_: complete_ && body.children.length === 0 && problem === ""
+    // A framed control leaves title, edge and status to the panel.
+    readonly property Item framed_: only_ !== null && only_.shell_ === panel && only_.framed ? only_ : null
+    readonly property string title_: title || (framed_ ? framed_.title : "")
+    readonly property string status_: framed_ && !problem ? framed_.aside_ : ""
+    readonly property bool wrong_: problem !== "" || (framed_ !== null && framed_.wrong)
+    // Whether the title has no room for all of the status.
+    property bool cut_: false
     readonly property size wanted_: {
         const hint = only_ ? only_.kddockwidgets_min_size : undefined
         if (hint !== undefined && hint.width > 0)
@@ -120,6 +127,8 @@ Item {
         if (one !== null && !one.anchors.fill && !one.anchors.centerIn)
             one.anchors.fill = body
         only_ = one
+        if (one !== null && one.shell_ !== undefined)
+            one.shell_ = panel
     }
 
     onShareChanged: Elements.checkShare(panel, "Panel")
@@ -132,7 +141,7 @@ Item {
     Component {
         id: ownWindow
         Window {
-            title: panel.title
+            title: panel.title_
             color: Theme.background
             onClosing: panel.attach()
             CockpitKeys { cockpit: panel.cockpit_ }
@@ -149,15 +158,21 @@ Item {
         id: frame
         anchors.fill: parent
         Accessible.role: Accessible.Grouping
-        Accessible.name: panel.title
-        Accessible.description: panel.problem
+        Accessible.name: panel.title_
+        Accessible.description: panel.problem || panel.status_
         onActiveFocusChanged: if (activeFocus && panel.cockpit_) panel.cockpit_.current = panel
 
         Rectangle {
             anchors.fill: parent
             color: Theme.panel
             radius: Theme.radius / 2
-            border { color: panel.problem ? Theme.bad : panel.current_ ? Theme.faint : Theme.edge; width: 1 }
+        }
+        Rectangle {
+            z: 2
+            anchors.fill: parent
+            radius: Theme.radius / 2
+            color: "transparent"
+            border { color: panel.wrong_ ? Theme.bad : panel.current_ ? Theme.faint : Theme.edge; width: panel.wrong_ ? 2 : 1 }
         }
         PanelTitle {
             id: bar

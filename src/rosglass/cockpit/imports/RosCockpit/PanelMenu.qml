@@ -79,7 +79,7 @@ T.Popup {
     contentItem: FocusScope {
         focus: true
         Accessible.role: Accessible.PopupMenu
-        Accessible.name: qsTr("Menu of %1").arg(menu.panel ? menu.panel.title : "")
+        Accessible.name: qsTr("Menu of %1").arg(menu.panel ? menu.panel.title_ : "")
         Column {
             id: rows
             function step(from, by) {

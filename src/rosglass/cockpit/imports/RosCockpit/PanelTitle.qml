@@ -10,7 +10,7 @@ FocusScope {
 
     focus: true
     Accessible.role: Accessible.TitleBar
-    Accessible.name: panel ? panel.title : ""
+    Accessible.name: panel ? panel.title_ : ""
     Accessible.focusable: true
     Keys.onPressed: function(event) {
         if (cockpit_ && cockpit_.drag_)
@@ -33,11 +33,19 @@ FocusScope {
                 panel: bar.panel
             }
             ThemeText {
-                anchors { left: parent.left; leftMargin: Theme.gap * 0.8; right: buttons.left; verticalCenter: parent.verticalCenter }
+                id: title
+                anchors { left: parent.left; leftMargin: Theme.gap * 0.8; verticalCenter: parent.verticalCenter }
+                width: Math.max(0, Math.min(implicitWidth, status.x - x - Theme.gap))
                 visible: !field.active
-                text: bar.panel ? bar.panel.title : ""
+                text: bar.panel ? bar.panel.title_ : ""
                 color: bar.panel && bar.panel.current_ ? Theme.text : Theme.dim
                 font { pixelSize: Theme.small; weight: Font.DemiBold }
+            }
+            PanelStatus {
+                id: status
+                anchors { right: buttons.left; rightMargin: Theme.gap * 0.8; verticalCenter: parent.verticalCenter }
+                width: Math.max(0, Math.min(implicitWidth, (buttons.x - Theme.gap) * (title.text ? 0.65 : 1)))
+                panel: bar.panel
             }
             FocusRing { anchors.margins: 1; radius: Theme.radius / 2; visible: bar.activeFocus && !field.active }
             PanelButtons {

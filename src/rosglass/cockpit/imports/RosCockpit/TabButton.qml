@@ -7,6 +7,8 @@ T.AbstractButton {
     id: button
 
     property bool selected: false
+    // Whether something is wrong there.
+    property bool wrong: false
     // What it says to screen readers, and its key.
     property string name: text
     property string hint
@@ -25,7 +27,7 @@ T.AbstractButton {
     contentItem: ThemeText {
         id: label
         text: button.text
-        color: button.selected ? Theme.text : Theme.dim
+        color: button.wrong ? Theme.bad : button.selected ? Theme.text : Theme.dim
         font.weight: button.selected ? Font.DemiBold : Font.Normal
         horizontalAlignment: Text.AlignHCenter
         verticalAlignment: Text.AlignVCenter

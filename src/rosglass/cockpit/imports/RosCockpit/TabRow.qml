@@ -37,7 +37,8 @@ Rectangle {
                 objectName: "tab" + index
                 height: row.height
                 width: Math.min(implicitWidth, (bar.width - buttons.width) / Math.max(1, bar.tabs.count))
-                text: element_ && element_.title ? element_.title : qsTr("Tab %1").arg(index + 1)
+                text: element_ && element_.title_ ? element_.title_ : qsTr("Tab %1").arg(index + 1)
+                wrong: element_ !== null && element_.wrong_ === true
                 selected: bar.tabs.currentItem === element_
                 onClicked: bar.tabs.show(index)
                 PanelGrip {
@@ -47,6 +48,11 @@ Rectangle {
                 }
             }
         }
+    }
+    PanelStatus {
+        anchors { right: buttons.left; rightMargin: Theme.gap * 0.8; verticalCenter: parent.verticalCenter }
+        width: Math.max(0, Math.min(implicitWidth, bar.width - buttons.width - row.width - 2 * Theme.gap))
+        panel: bar.panel_
     }
     PanelButtons {
         id: buttons

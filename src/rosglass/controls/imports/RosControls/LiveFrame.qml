@@ -40,7 +40,11 @@ Item {
     implicitWidth: contentWidth + 2 * inset
     implicitHeight: top_ + contentHeight + inset
 
-    readonly property real top_: framed ? Theme.small * 1.5 + Theme.gap * 1.1 : 0
+    // What shows title, edge and status in its place: the Panel of a layout that it fills.
+    property Item shell_: null
+    readonly property bool drawn_: framed && shell_ === null
+    readonly property string aside_: dated_ ? old_ + " · " + status : status || note
+    readonly property real top_: drawn_ ? Theme.small * 1.5 + Theme.gap * 1.1 : framed ? Theme.gap / 2 : 0
     readonly property real inset: framed ? Theme.gap : 0
     readonly property string old_: qsTr("OLD: %1 s").arg(age < 10 ? age.toFixed(1) : age.toFixed(0))
     // Data that is shown, but old, has its age before the reason, of which the end may be cut.
@@ -55,14 +59,14 @@ Item {
 
     Rectangle {
         anchors.fill: parent
-        visible: frame.framed
+        visible: frame.drawn_
         color: Theme.panel
         radius: Theme.radius
         border { color: frame.wrong ? Theme.bad : Theme.edge; width: frame.wrong ? 2 : 1 }
     }
     ThemeText {
         id: heading
-        visible: frame.framed
+        visible: frame.drawn_
         anchors { left: parent.left; top: parent.top; leftMargin: Theme.gap; topMargin: Theme.gap * 0.6 }
         width: Math.min(implicitWidth, Math.max(0, frame.width - 2 * Theme.gap - (aside.text ? Math.min(aside.implicitWidth, frame.width / 2) + Theme.gap : 0)))
         text: frame.title
@@ -75,7 +79,8 @@ Item {
         width: Math.min(implicitWidth, Math.max(0, frame.width - 2 * Theme.gap - (frame.framed && frame.title ? Math.min(heading.implicitWidth, frame.width / 2) + Theme.gap : 0)))
         z: 1
         objectName: "aside"
-        text: frame.dated_ ? frame.old_ + " · " + frame.status : frame.status || frame.note
+        visible: frame.drawn_ || !frame.framed
+        text: frame.aside_
         color: frame.wrong ? Theme.bad : Theme.dim
         font.weight: frame.wrong ? Font.Bold : Font.Normal
         horizontalAlignment: Text.AlignRight
@@ -89,7 +94,7 @@ Item {
     ThemeReason {
         objectName: "wholeProblem"
         anchors { fill: body; margins: frame.framed ? 0 : Theme.gap }
-        visible: aside.truncated && frame.reason_ !== "" && frame.stale && !frame.filled
+        visible: (frame.framed && frame.shell_ ? frame.shell_.cut_ : aside.truncated) && frame.reason_ !== "" && frame.stale && !frame.filled
         text: frame.reason_
         color: Theme.bad
         wrapMode: Text.Wrap
