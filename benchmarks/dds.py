@@ -19,12 +19,13 @@ import json
 import os
 import random
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
+
+from publishing import finish, measure, send_for
 
 STRING, IMAGE, POSE = (
     "std_msgs/msg/String",
@@ -195,56 +196,14 @@ def publisher(plan: dict[str, Any]) -> None:
     """Publish for a while at the plan's rate."""
     send = sender(plan)
     time.sleep(1.0)
-    print("ready", flush=True)
-    sys.stdin.readline()
-    end = time.monotonic() + plan["seconds"]
-    count = 0
-    due = time.monotonic()
-    while time.monotonic() < end:
-        send()
-        count += 1
-        if plan["hz"]:
-            due += 1 / plan["hz"]
-            time.sleep(max(0.0, due - time.monotonic()))
-    print(json.dumps({"count": count}), flush=True)
-    sys.stdin.readline()
-
-
-def measure(plan: dict[str, Any]) -> dict[str, Any]:
-    """Run one case; returns the subscriber's figures with what was `sent`."""
-    processes = []
-    for role in ("subscriber", "publisher"):
-        process = subprocess.Popen(
-            [sys.executable, __file__, "--role", role, "--plan", json.dumps(plan)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
-        processes.append(process)
-    receiving, sending = processes
-    assert receiving.stdin is not None
-    assert sending.stdin is not None
-    assert receiving.stdout is not None
-    assert sending.stdout is not None
-    for process in processes:
-        print(file=process.stdin, flush=True)
-    sent = json.loads(sending.stdout.readline())["count"]
-    time.sleep(1.0)
-    print(file=receiving.stdin, flush=True)
-    figures: dict[str, Any] = json.loads(receiving.stdout.readline())
-    for process in processes:
-        process.kill()
-        process.wait()
-    return figures | {"sent": sent}
+    send_for(send, plan["seconds"], plan["hz"])
 
 
 def best(plan: dict[str, Any], ways: tuple[str, ...], figure: str, top: bool) -> dict[str, Any]:
     """Run each way twice, in turns; returns the run with the better `figure` of each."""
     found: dict[str, Any] = {}
     for way in ways * plan["turns"]:
-        figures = measure(plan | {"how": way})
+        figures = measure(__file__, plan | {"how": way})
         if figure not in figures:
             figures |= {"median": float("inf"), "p99": float("inf"), "max": float("inf")}
         known = found.get(way)
@@ -366,11 +325,7 @@ def main() -> int:
         (subscriber if args.role == "subscriber" else publisher)(args.plan)
         return 0
     results, missed = run(args.quick, args.only or " ".join(cases))
-    if args.json:
-        args.json.write_text(json.dumps(results, indent=2))
-    for line in missed:
-        print("MISSED", line)
-    return 1 if missed else 0
+    return finish(results, missed, args.json)
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 import zenoh_peers as peers
+from publishing import finish
 
 POSE = "geometry_msgs/msg/PoseStamped"
 #: Seconds before the CPU is measured: a reader chooses its way of receiving once a second.
@@ -292,11 +293,7 @@ def main() -> int:
                     found[way].append(measure(plan | {"port": port}))
         results[case.name] = found
         missed += judge(case, found)
-    if args.json:
-        args.json.write_text(json.dumps(results, indent=2))
-    for line in missed:
-        print("MISSED", line)
-    return 1 if missed else 0
+    return finish(results, missed, args.json)
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
+from publishing import finish
 
 SERIES, HZ, HISTORY_S, FRAME_S = 20, 1000, 600, 1 / 30
 POSE = "geometry_msgs/msg/PoseStamped"
@@ -451,11 +452,7 @@ def main() -> int:
         results["frames"] = frames(args.seconds, args.way, missed)
     if args.only in (None, "receive"):
         results["receive"] = receiving(args.seconds, missed)
-    if args.json:
-        args.json.write_text(json.dumps(results, indent=2))
-    for line in missed:
-        print("MISSED", line)
-    return 1 if missed else 0
+    return finish(results, missed, args.json)
 
 
 if __name__ == "__main__":

@@ -34,6 +34,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from publishing import finish
+
 PEERS = Path(__file__).parent / "ros1_peers"
 TYPES = {
     "text": "std_msgs/String",
@@ -397,11 +399,7 @@ def main() -> int:
             results, missed = run(bench, args.only or " ".join(cases))
         finally:
             bench.close()
-    if args.json:
-        args.json.write_text(json.dumps(results, indent=2))
-    for line in missed:
-        print("MISSED", line)
-    return 1 if missed else 0
+    return finish(results, missed, args.json)
 
 
 if __name__ == "__main__":

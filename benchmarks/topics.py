@@ -19,7 +19,6 @@ import argparse
 import importlib.util
 import json
 import statistics
-import subprocess
 import sys
 import time
 from dataclasses import dataclass
@@ -28,6 +27,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 import zenoh_peers as peers
+from publishing import finish, measure, send_for
 
 STRING, IMAGE = "std_msgs/msg/String", "sensor_msgs/msg/Image"
 POSE = "geometry_msgs/msg/PoseStamped"
@@ -215,54 +215,7 @@ def publisher(plan: dict[str, Any]) -> None:
                 made.publish(value)
 
     time.sleep(0.5)
-    print("ready", flush=True)
-    sys.stdin.readline()
-    end = time.monotonic() + plan["seconds"] + (_SETTLE if plan["measures"] == "unread" else 0)
-    count = 0
-    due = time.monotonic()
-    while time.monotonic() < end:
-        put()
-        count += 1
-        if plan["hz"]:
-            due += 1 / plan["hz"]
-            time.sleep(max(0.0, due - time.monotonic()))
-    print(json.dumps({"count": count}), flush=True)
-    sys.stdin.readline()
-
-
-def measure(plan: dict[str, Any]) -> dict[str, Any]:
-    """Run one case; returns the subscriber's figures with what was `sent`."""
-    processes = []
-    for role in ("subscriber", "publisher"):
-        process = subprocess.Popen(
-            [sys.executable, "-W", "ignore", __file__, "--role", role, "--plan", json.dumps(plan)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        _read(process, "ready")
-        processes.append(process)
-    for process in processes:
-        print(file=process.stdin, flush=True)
-    receiving, sending = processes
-    sent = json.loads(_read(sending, "{"))["count"]
-    if plan["measures"] != "unread":
-        time.sleep(0.5)
-    print(file=receiving.stdin, flush=True)
-    figures: dict[str, Any] = json.loads(_read(receiving, "{"))
-    for process in processes:
-        process.kill()
-        process.wait()
-    return figures | {"sent": sent}
-
-
-def _read(process: subprocess.Popen[str], beginning: str) -> str:
-    """Return the next line that begins so; peers print other things, too."""
-    assert process.stdout is not None
-    for line in process.stdout:
-        if line.startswith(beginning):
-            return line
-    raise RuntimeError(f"{process.args} ended with {process.wait()}")
+    send_for(put, plan["seconds"] + (_SETTLE if plan["measures"] == "unread" else 0), plan["hz"])
 
 
 def best(case: Case, common: dict[str, Any], turns: int) -> dict[str, Any]:
@@ -280,7 +233,7 @@ def best(case: Case, common: dict[str, Any], turns: int) -> dict[str, Any]:
             plan |= {
                 name: getattr(case, name) for name in ("type", "hz", "size", "shm", "measures")
             }
-            figures = measure(plan)
+            figures = measure(__file__, plan, 0.0 if case.measures == "unread" else 0.5)
             known = found.get(way)
             if known is None or (figures[figure] > known[figure]) is top:
                 found[way] = figures
@@ -358,11 +311,7 @@ def main() -> int:
         return 0
     cases = [case for case in CASES if args.case in case.name]
     results, missed = run(cases, 2.0 if args.quick else 3.0, 2 if args.quick else 4)
-    if args.json:
-        args.json.write_text(json.dumps(results, indent=2))
-    for line in missed:
-        print("MISSED", line)
-    return 1 if missed else 0
+    return finish(results, missed, args.json)
 
 
 if __name__ == "__main__":
