@@ -13,7 +13,9 @@ from typing import Any
 import pytest
 from waiting import eventually
 
-pytestmark = pytest.mark.xvfb
+from conftest import QT5
+
+pytestmark = [pytest.mark.xvfb, pytest.mark.both_qt]
 
 HERE = Path(__file__).parent
 #: Debian's Python has pyatspi.
@@ -106,6 +108,10 @@ class Reader:
         result: list[dict[str, Any]] = json.loads(answer)
         return result
 
+    def is_complete(self) -> bool:
+        """Return whether the cockpit is on the bus."""
+        return len(self.ask("all")) > len(EXPECTED)
+
     def close(self) -> None:
         assert self._process.stdin is not None
         self._process.stdin.close()
@@ -119,13 +125,22 @@ def reader(screen: str, tmp_path_factory: Any) -> Any:
         pytest.skip("needs sudo apt-get install python3-pyatspi at-spi2-core dbus-daemon")
     file = tmp_path_factory.mktemp("cockpit") / "Cockpit.qml"
     file.write_text(COCKPIT)
-    made = Reader(file, screen)
-    try:
-        log = file.with_name("log")
-        eventually(lambda: len(made.ask("all")) > len(EXPECTED), log.read_text)
-        yield made
-    finally:
-        made.close()
+    log = file.with_name("log")
+    # In about every second start, Qt 5's bridge finds its connection closed ("Error in contacting
+    # registry"), also with a single button: such a program is started again.
+    for left in reversed(range(10 if QT5 else 1)):
+        made = Reader(file, screen)
+        try:
+            eventually(lambda: "connected: " in log.read_text(), log.read_text)
+            eventually(made.is_complete, log.read_text, timeout=5.0 if left else 30.0)
+        except AssertionError:
+            made.close()
+            if not left:
+                raise
+        else:
+            yield made
+            made.close()
+            return
 
 
 def test_roles_and_names(reader: Reader) -> None:
@@ -145,7 +160,8 @@ def test_states(reader: Reader) -> None:
     assert by_name["Lights"]["checked"]
     assert not by_name["Autonomy"]["checked"]
     assert by_name["Dock"]["enabled"]
-    assert not by_name["Fly"]["enabled"]
+    if not QT5:  # which passes on what is attached to an item only, and has no property for it
+        assert not by_name["Fly"]["enabled"]
     for name in ("Emergency stop", "Drive stick", "Dock", "Brightness", "Note", "Floor: ground"):
         assert by_name[name]["focusable"], name
 
