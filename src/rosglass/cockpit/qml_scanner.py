@@ -61,6 +61,7 @@ _BINARY = frozenset(
     "= == === != !== < > <= >= + - * / % ** & | ^ && || ?? << >> >>> += -= *= /= %= **= &= |= ^= "  # noqa: SIM905
     "&&= ||= ??= <<= >>= >>>= ,".split()
 )
+_DECLARATIONS = frozenset(["property", "required", "signal", "function", "enum", "component"])
 _MODIFIERS = frozenset(["default", "required", "readonly", "final", "virtual", "override"])
 
 
@@ -731,7 +732,7 @@ class Scanner:
         if token == ":":
             owner.items.append(member)
             return self._value(stack, member, after)
-        if token == "on" and name.rpartition(".")[2][0].isupper():
+        if token == "on" and name not in _DECLARATIONS:
             on, _, end = self._qualified(after, "a property after on")
             return self._open(stack, name, start, end, on, None)
         return self._declaration(stack, member, name, end, sign_at)

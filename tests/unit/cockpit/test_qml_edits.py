@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import random
+import re
 import subprocess
 from collections import Counter
 from functools import cache
@@ -34,6 +36,27 @@ def files() -> tuple[Path, ...]:
 
     roots = [ROOT / "src", ROOT / "examples", Path(PySide6.__path__[0])]
     return tuple(path for root in roots for path in sorted(root.rglob("*.qml")))
+
+
+def refused_by_qt(folder: Path) -> dict[str, str]:
+    """Return the names of files in a folder that Qt's parser refuses, and why."""
+    import PySide6
+
+    names = sorted(path.name for path in folder.glob("*.qml"))
+    done = subprocess.run(
+        [str(Path(PySide6.__path__[0]) / "qmllint"), "--bare", "--json", "-", *names],
+        cwd=folder,
+        capture_output=True,
+        check=False,
+    )
+    refused = {}
+    files = json.loads(done.stdout)["files"]
+    assert [Path(file["filename"]).name for file in files] == names
+    for file in files:
+        messages = [one["message"] for one in file["warnings"] if one["id"] == "syntax"]
+        if messages or (not file["success"] and not file["warnings"]):
+            refused[Path(file["filename"]).name] = " ".join(messages)
+    return refused
 
 
 def entries(found: Object) -> tuple[object, ...]:
@@ -201,10 +224,10 @@ class Editor:
         return after
 
 
-def test_thousand_edits_of_all_files_and_their_undo() -> None:
+def test_thousand_edits_of_all_files_and_their_undo(tmp_path: Path) -> None:
     editor = Editor(1)
     chosen = editor.random.sample(files(), 300)
-    for path in chosen:
+    for index, path in enumerate(chosen):
         text = path.read_bytes().decode()
         if editor.random.random() < 0.3:
             text = text.replace("\r\n", "\n").replace("\n", "\r\n")
@@ -217,8 +240,10 @@ def test_thousand_edits_of_all_files_and_their_undo() -> None:
                 assert document.text.count("\r\n") == document.text.count("\n")
         assert [history.undo() for _ in texts[1:]] == texts[-2::-1]
         assert [history.redo() for _ in texts[1:]] == texts[1:]
+        (tmp_path / f"{index}.qml").write_bytes(document.text.encode())
     assert editor.edits.total() > 1000
     assert min(editor.edits.values()) > 20
+    assert not refused_by_qt(tmp_path)
 
 
 def test_one_changed_property_is_one_line_for_git(tmp_path: Path) -> None:
@@ -348,6 +373,127 @@ def test_text_of_any_shape_is_read_and_edited(
     while history.undo_name:
         history.undo()
     assert history.text == text
+
+
+SNIPPETS = """\
+a: 1 b: 2
+a: 1; b: 2
+a: A {}; b: 1
+a: A {} b: 1
+A {}; A {}
+a: 1;; b: 2
+;
+a: {}; b: 1
+a: {} b: 1
+a: ; b: 1
+a: return 1
+a: for (;;) b()
+a: if (b) c() else d()
+a: if (b) c(); else d(); e: 1
+a: if (b) { } else { } e: 1
+a: if (b) c();; d: 1
+a: do b(); while (c)
+a: var b = 1
+a: b /* c */ d: 1
+l: [A {}, A {}] b: 1
+l: [A {}, A {}]; b: 1
+l: [A {} A {}]
+l: [A {},]
+l: [,]
+property list<Item> l: [A {}]; property int b
+property list<Item> l: [A {}] property int b
+property var l: [A {}]
+property Item a: A {}; property int b
+property Item a: A {} property int b
+property int a: {1}; property int b
+property int a property int b
+property int a; property int b
+function f() {}; b: 1
+function f() {} b: 1
+function f(a: int, b = "}"): string { return "{" }
+enum E { A }; b: 1
+component B: A {}; b: 1
+component B: { }
+signal a signal b
+signal a(int b); signal c
+required a; b: 1
+default readonly property int a: 1
+final property int a: 3
+@A { b: 1 } c: 1
+font { bold: true }; b: 1
+font . bold: true
+A on b {}
+a.b on c {}
+a: /b]/.c
+a: /[/]/.c
+a: /[/
+a: `${`}`}`
+a: `${`
+a: "b
+a: (b))
+a: b ? c
+a: b ? c : d ? e : f
+a: async
+a: b => { return 1 }
+a: new (b)
+a: typeof
+a: !
+a: b++ / 2
+a: 3px
+a: b as A
+a:
+:
+a
+"a": 1
+import A
+""".splitlines()
+
+
+def test_qt_and_the_scanner_refuse_the_same(tmp_path: Path) -> None:
+    refused = set()
+    for index, snippet in enumerate(SNIPPETS):
+        text = f"Item {{ {snippet} }}\n"
+        (tmp_path / f"{index}.qml").write_text(text)
+        try:
+            Document(text)
+        except rosglass.QmlSyntaxError:
+            refused.add(snippet)
+    assert 30 < len(refused) < 45
+    assert refused == {SNIPPETS[int(Path(name).stem)] for name in refused_by_qt(tmp_path)}
+
+
+def test_changed_tokens_that_qt_reads_are_read(tmp_path: Path) -> None:
+    choose = random.Random(3)
+    tokens = re.compile(r"\s+|\w+|\W")
+    extra = [
+        *"{}()[];:,/`'\".?+1x",
+        "if",
+        "else",
+        "function",
+        "on",
+        "as",
+        "=>",
+        "//c\n",
+        "\n",
+        "in",
+    ]
+    small = [path for path in files() if path.stat().st_size < 6000]
+    refused = {}
+    for index in range(600):
+        parts = tokens.findall(choose.choice(small).read_bytes().decode())
+        at = choose.randrange(len(parts))
+        if choose.random() < 0.6:
+            parts.insert(at, choose.choice(extra))
+        else:
+            del parts[at]
+        name, text = f"{index}.qml", "".join(parts)
+        (tmp_path / name).write_bytes(text.encode())
+        try:
+            Document(text)
+        except rosglass.QmlSyntaxError as error:
+            refused[name] = str(error)
+    assert 100 < len(refused) < 500
+    assert not refused.keys() - refused_by_qt(tmp_path).keys()
 
 
 @settings(max_examples=600, deadline=None)
