@@ -47,6 +47,12 @@ def test_qmldir_lists_the_files() -> None:
     assert sorted(FILES.values()) == sorted(file.name for file in MODULE.glob("*.qml"))
 
 
+def test_no_file_beside_an_interface_has_the_name_of_a_control() -> None:
+    """The module's type would be used instead: the demo's Lamp once was a gauge without a path."""
+    files = [*ROOT.glob("examples/**/*.qml"), *ROOT.glob("src/rosglass/demo/**/*.qml")]
+    assert [str(file) for file in files if file.stem in {*FILES, *TYPES}] == []
+
+
 def test_every_control_has_a_page() -> None:
     assert {*FILES, *TYPES} - PARTS - MAP_PARTS - PAGES.keys() == set()
 

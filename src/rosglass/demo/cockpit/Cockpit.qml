@@ -159,7 +159,7 @@ Item {
         id: stick; objectName: "stick"; command: drive; width: cockpit.control
         height: width; x: camera.x + cockpit.margin; y: cockpit.floor - height
     }
-    Lamp {
+    LampSwitch {
         id: lamp; objectName: "lamp"
         anchors { right: stop.left; bottom: stop.bottom; rightMargin: Math.min(14, cockpit.margin) }
         visible: cockpit.roomy
