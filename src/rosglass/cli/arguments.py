@@ -347,6 +347,42 @@ def _view(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _cockpit(parser: argparse.ArgumentParser) -> None:
+    layout = parser.add_argument(
+        "layout",
+        metavar="LAYOUT.qml",
+        nargs="?",
+        default="",
+        help="the layout to open; package://name/path for a file in a package (default: a page "
+        "with the robots found)",
+    )
+    complete(layout, "*.qml")
+    _add_robot_url(parser)
+    parser.add_argument(
+        "--panels",
+        metavar="FOLDER",
+        action="append",
+        default=[],
+        help="a folder with panels of your own: QML files, or plugins of RQml; may be repeated",
+    )
+    _add_import_paths(parser)
+    parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
+    _add_interface_options(parser, "the window", "the window", after=3.0)
+    parser.set_defaults(
+        # It looks for robots itself, and shows what it finds.
+        arguments=[],
+        ros_arguments=[],
+        looks_nearby=False,
+        watch=False,
+        kiosk=False,
+        record=None,
+    )
+    parser.epilog = (
+        "Ctrl+P lists all commands, F1 opens the help of a panel. `rosglass run LAYOUT.qml` shows "
+        "a saved layout without the editor. Arguments after --ros-args are for ROS."
+    )
+
+
 def _qml_path(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--qmlls-ini",
@@ -1022,6 +1058,7 @@ def _completion(parser: argparse.ArgumentParser) -> None:
 #: with ``run(args) -> int`` or a function for each subcommand.
 COMMANDS = {
     "run": (_run, "open an interface written in QML"),
+    "cockpit": (_cockpit, "arrange a robot's panels on a screen, without a line of code"),
     "rviz": (_rviz, "open RViz with interfaces over its 3D view"),
     "plot": (_plot, "plot numbers of topics, in a window or the terminal"),
     "view": (_view, "show the robot in a 3D view like RViz's, without RViz"),

@@ -39,6 +39,7 @@ EXAMPLES = {
     "action list": ("-t",),
     "action send": ("/dock '{station: 3}' --feedback",),
     "bridge": ("ros1://robot:11311 zenoh://127.0.0.1:7447 -t '/camera/*->' -t '/cmd_vel<-'",),
+    "cockpit": ("", "drive.qml --url zenoh://robot.local:7447", "--panels ~/panels"),
     "demo": ("", "--no-robot --url zenoh://robot.local:7447"),
     "doctor": ("--url zenoh://robot.local:7447", "--scan"),
     "examples": ("", "remote_control", "--all mine"),

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["build_parser", "parse", "run"]
 
 #: Commands that load Qt: Ctrl-C ends the process until they handle it themselves.
-_WITH_QT = ("run", "rviz", "view", "demo", "plot")
+_WITH_QT = ("run", "cockpit", "rviz", "view", "demo", "plot")
 #: Commands of ``ros2`` -> their counterparts here.
 _AS_IN_ROS2: dict[tuple[str, ...], list[str]] = {
     ("bag", "record"): ["record"],

@@ -39,7 +39,8 @@ _ROOT = Path(rosglass.__file__).parent
 _CONTROLS = _ROOT / "controls/imports/RosControls"
 _SCENE_VIEW = _ROOT / "scene/view/scene_view.py"
 _ROS2_TYPES = _ROOT / "qml/imports/Ros2"
-_PLAIN_IMPORT, _SCENE_IMPORT = "RosControls 1.0", "RosScene 1.0"
+# RosScene has a CameraView of its own.
+_PLAIN_IMPORT, _SCENE_IMPORT = "RosControls 1.0", "RosScene 1.0 as Scene"
 #: Files of a folder that are listed, and bytes of one that is read.
 _MAX_FILES, _MAX_BYTES = 500, 1_000_000
 #: Letters of a text that is compared with similar ones.
@@ -73,7 +74,7 @@ _SNIPPETS = {
     "ModeSwitch": 'ModeSwitch {\n    topic: "mode"\n    modes: ["manual", "auto"]\n}',
     "ServiceButton": 'ServiceButton {\n    service: ""\n}',
     "ActionPanel": 'ActionPanel {\n    action: ""\n}',
-    "SceneView": 'SceneView {\n    fixedFrame: "map"\n}',
+    "SceneView": 'Scene.SceneView {\n    fixedFrame: "map"\n}',
 }
 #: Types of the topics that a control shows, where the heading of its file does not name them.
 _TYPES = {

@@ -1,0 +1,127 @@
+// The window of `rosglass cockpit`: a layout, and in edit mode the catalogue and the properties around it.
+import QtQuick 2.15
+import QtQuick.Window 2.15
+import RosControls 1.0
+
+Window {
+    id: window
+
+    readonly property bool editing: program.opened && program.editing
+    // Where the layout is shown.
+    readonly property Item stage: stage_
+    property bool sure_: false
+
+    width: 1280
+    height: 800
+    visible: true
+    color: Theme.background
+    title: (program.modified ? "• " : "") + (program.opened ? program.name : qsTr("Cockpit")) + " – rosglass"
+
+    onClosing: function(close) {
+        if (!program.modified || sure_)
+            return
+        close.accepted = false
+        closing.open()
+    }
+    Component.onCompleted: program.begin(window, stage_)
+
+    EditorBar {
+        id: bar
+        anchors { left: parent.left; right: parent.right; top: parent.top }
+        visible: !program.kiosk
+        height: visible ? implicitHeight : 0
+        onPaletteWanted: palette.open()
+        onFileWanted: function(purpose) { files.ask(purpose) }
+        onHelpWanted: program.help("")
+    }
+    CatalogueBox {
+        id: catalogue
+        objectName: "catalogue"
+        anchors { left: parent.left; top: bar.bottom; bottom: status.top }
+        width: visible ? Math.min(280 * Theme.size, window.width * 0.3) : 0
+        visible: window.editing
+    }
+    PropertyBox {
+        id: properties
+        objectName: "properties"
+        anchors { right: parent.right; top: bar.bottom; bottom: status.top }
+        width: visible ? Math.min(320 * Theme.size, window.width * 0.3) : 0
+        visible: window.editing && program.selected
+    }
+    Item {
+        id: stage_
+        objectName: "stage"
+        anchors { left: catalogue.right; right: properties.left; top: bar.bottom; bottom: status.top }
+    }
+    StartPage {
+        objectName: "startPage"
+        anchors.fill: stage_
+        visible: !program.opened
+        onFileWanted: function(purpose) { files.ask(purpose) }
+    }
+    ErrorBox {
+        anchors { fill: stage_; margins: Theme.gap }
+        visible: program.problem !== ""
+        text: program.problem
+    }
+    Rectangle {
+        id: status
+        objectName: "status"
+        anchors { left: parent.left; right: parent.right; bottom: parent.bottom }
+        height: visible ? 28 * Theme.size : 0
+        visible: !program.kiosk && program.message !== ""
+        color: Theme.panel
+        ThemeText {
+            anchors { fill: parent; leftMargin: Theme.gap; rightMargin: Theme.gap }
+            verticalAlignment: Text.AlignVCenter
+            text: program.message
+            Accessible.role: Accessible.AlertMessage
+            Accessible.name: text
+        }
+    }
+
+    CommandPalette { id: palette; objectName: "palette" }
+    FileBox { id: files }
+    HelpBox {
+        id: helpBox
+        objectName: "helpBox"
+        visible: program.helpText !== ""
+    }
+    QuestionBox {
+        id: closing
+        objectName: "closing"
+        text: qsTr("%1 has changes that are not saved.").arg(program.name)
+        answers: [qsTr("Save"), qsTr("Discard"), qsTr("Go on")]
+        onAnswered: function(index) {
+            if (index === 2 || index === 0 && !program.save(""))
+                return
+            if (index === 1)
+                program.discard()
+            window.sure_ = true
+            window.close()
+        }
+    }
+    QuestionBox {
+        id: question
+        objectName: "question"
+        text: program.question
+        answers: program.answers
+        onAnswered: function(index) { program.answer(index) }
+        Connections {
+            target: program
+            function onQuestionChanged() { if (program.question !== "") question.open(); else question.close() }
+        }
+    }
+
+    Repeater {
+        model: program.commands("")
+        Item {
+            Shortcut {
+                sequences: modelData.keys ? [modelData.keys] : []
+                context: Qt.ApplicationShortcut
+                onActivated: modelData.name === "palette" ? palette.open()
+                    : modelData.file ? files.ask(modelData.name) : program.run(modelData.name)
+            }
+        }
+    }
+}

@@ -1,0 +1,73 @@
+// The bar of the editor: file, undo and redo, edit mode, and the robot's connection.
+import QtQuick 2.15
+import RosControls 1.0
+
+Rectangle {
+    id: bar
+
+    signal paletteWanted()
+    signal fileWanted(string purpose)
+    signal helpWanted()
+
+    implicitHeight: Theme.touch + 2 * Theme.gap / 2
+    color: Theme.panel
+    Accessible.role: Accessible.ToolBar
+    Accessible.name: qsTr("Tools")
+
+    Row {
+        id: tools
+        anchors { left: parent.left; leftMargin: Theme.gap; verticalCenter: parent.verticalCenter }
+        spacing: Theme.gap / 2
+
+        ThemeButton { text: qsTr("Home"); visible: program.opened; objectName: "home"; onClicked: program.run("home") }
+        ThemeButton { text: qsTr("Open"); objectName: "open"; onClicked: bar.fileWanted("open") }
+        ThemeButton {
+            objectName: "save"
+            text: program.modified ? qsTr("Save •") : qsTr("Save")
+            enabled: program.opened && program.modified
+            Accessible.name: qsTr("Save")
+            onClicked: program.path ? program.save("") : bar.fileWanted("save as")
+        }
+        ThemeButton {
+            objectName: "edit"
+            text: program.editing ? qsTr("Done") : qsTr("Edit")
+            visible: program.opened
+            selected: program.editing
+            onClicked: program.run("edit")
+        }
+        ThemeButton {
+            objectName: "undo"
+            text: qsTr("Undo")
+            visible: program.editing && program.opened
+            enabled: program.undoText !== ""
+            Accessible.description: program.undoText
+            onClicked: program.undo()
+        }
+        ThemeButton {
+            objectName: "redo"
+            text: qsTr("Redo")
+            visible: program.editing && program.opened
+            enabled: program.redoText !== ""
+            Accessible.description: program.redoText
+            onClicked: program.redo()
+        }
+        ThemeButton { text: qsTr("Commands …"); objectName: "commands"; onClicked: bar.paletteWanted() }
+    }
+    ThemeText {
+        anchors { left: tools.right; right: robot.left; margins: Theme.gap; verticalCenter: parent.verticalCenter }
+        horizontalAlignment: Text.AlignRight
+        color: program.connected ? Theme.dim : Theme.warn
+        text: program.connection
+        Accessible.role: Accessible.StaticText
+        Accessible.name: text
+    }
+    ThemeButton {
+        id: robot
+        objectName: "robot"
+        anchors { right: parent.right; rightMargin: Theme.gap; verticalCenter: parent.verticalCenter }
+        visible: program.opened
+        text: program.connected ? qsTr("Robot") : qsTr("Find robot")
+        tint: program.connected ? Theme.good : Theme.warn
+        onClicked: program.run("home")
+    }
+}

@@ -1,0 +1,54 @@
+// A question with its answers, over the window.
+import QtQuick 2.15
+import QtQuick.Templates 2.15 as T
+import RosControls 1.0
+
+T.Popup {
+    id: box
+
+    property string text
+    property var answers: []
+    signal answered(int index)
+
+    function choose(index) {
+        close()
+        answered(index)
+    }
+
+    parent: T.Overlay.overlay
+    anchors.centerIn: parent
+    width: parent ? Math.min(560 * Theme.size, parent.width - 2 * Theme.gap) : 100
+    modal: true
+    focus: true
+    padding: 2 * Theme.gap
+    closePolicy: T.Popup.NoAutoClose
+
+    background: Rectangle {
+        color: Theme.panel
+        radius: Theme.radius
+        border { color: Theme.warn; width: 1 }
+    }
+    contentItem: Column {
+        spacing: 2 * Theme.gap
+        ThemeText {
+            width: parent.width
+            text: box.text
+            wrapMode: Text.Wrap
+            Accessible.role: Accessible.AlertMessage
+            Accessible.name: text
+        }
+        Row {
+            anchors.right: parent.right
+            spacing: Theme.gap
+            Repeater {
+                model: box.answers
+                delegate: ThemeButton {
+                    focus: index === 0
+                    text: modelData
+                    objectName: "answer" + index
+                    onClicked: box.choose(index)
+                }
+            }
+        }
+    }
+}
