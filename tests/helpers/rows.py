@@ -22,3 +22,13 @@ def rows_of(model: Any) -> list[dict[str, Any]]:
         {name: model.data(model.index(at, 0), role) for role, name in roles.items()}
         for at in range(model.rowCount())
     ]
+
+
+def tree_rows(controls: Any, *roles: str) -> list[Any]:
+    """Return a role, or several, of all rows of the tree that is shown."""
+    model = controls.find("tree").property("model")
+    found = []
+    for row in range(model.rowCount()):
+        values = [model.value(row, role) for role in roles]
+        found.append(values[0] if len(roles) == 1 else tuple(values))
+    return found

@@ -46,15 +46,6 @@ class ControlBench:
             waiting += one.childItems()
         raise AssertionError(f"the window has no item {name!r}")
 
-    def click(self, name: str) -> None:
-        """Click on the middle of an item with an ``objectName``."""
-        from rosglass.qt import QtCore, optional
-
-        item = self.find(name)
-        middle = item.mapToScene(QtCore.QPointF(item.width() / 2, item.height() / 2)).toPoint()
-        left, none = QtCore.Qt.MouseButton.LeftButton, QtCore.Qt.KeyboardModifier.NoModifier
-        optional("QtTest").QTest.mouseClick(self.window, left, none, middle)
-
     def grab(self) -> Any:
         """Return what the window shows, as a QImage."""
         return self.window.grabWindow()

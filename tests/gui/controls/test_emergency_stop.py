@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from hands import press, release
 
 from rosglass.qt import QtCore, QtGui, optional
 
@@ -78,32 +79,17 @@ def confirmation(controls: Any) -> str:
     return str(controls.find("confirmation").property("text"))
 
 
-def middle(item: Any) -> QtCore.QPoint:
-    at = item.mapToScene(QtCore.QPointF(item.width() / 2, item.height() / 2))
-    return at.toPoint()
-
-
-def press(controls: Any, name: str) -> None:
-    left, none = QtCore.Qt.MouseButton.LeftButton, QtCore.Qt.KeyboardModifier.NoModifier
-    test.mousePress(controls.window, left, none, middle(controls.find(name)))
-
-
-def lift(controls: Any, name: str) -> None:
-    left, none = QtCore.Qt.MouseButton.LeftButton, QtCore.Qt.KeyboardModifier.NoModifier
-    test.mouseRelease(controls.window, left, none, middle(controls.find(name)))
-
-
 def test_at_the_edge_of_the_window_the_bar_stays_within_reach(
     controls: Any, wait: Any, latch: Latch
 ) -> None:
     stop = show(controls, wait, "EmergencyStop { width: 160; height: 160 }")
     press(controls, "mushroom")
-    lift(controls, "mushroom")
+    release(controls, "mushroom")
     wait(lambda: stop.property("stopped"))
     assert controls.find("unlock").mapToScene(QtCore.QPointF(0, 0)).y() >= 0
     press(controls, "unlock")
     wait(lambda: not latch.stopped)
-    lift(controls, "unlock")
+    release(controls, "unlock")
 
 
 def test_a_click_stops_and_a_long_press_releases(controls: Any, wait: Any, latch: Latch) -> None:
@@ -111,17 +97,17 @@ def test_a_click_stops_and_a_long_press_releases(controls: Any, wait: Any, latch
     wait(lambda: stop.property("known"))
     assert confirmation(controls) == "space bar"
     press(controls, "mushroom")
-    lift(controls, "mushroom")
+    release(controls, "mushroom")
     wait(lambda: stop.property("stopped"))
     wait(lambda: confirmation(controls) == "confirmed")
     press(controls, "unlock")
     wait.nothing_happens(0.2)
-    lift(controls, "unlock")
+    release(controls, "unlock")
     wait.nothing_happens(0.7)
     assert latch.stopped, "a short press does not release"
     press(controls, "unlock")
     wait(lambda: not latch.stopped)
-    lift(controls, "unlock")
+    release(controls, "unlock")
     wait(lambda: not stop.property("blocks"))
     assert latch.commands == [True, False]
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from hands import click
 
 pytest.importorskip("sdl2", reason='needs pip install "rosglass[gamepad]"')
 
@@ -401,7 +402,7 @@ def test_the_view_shows_axes_and_buttons(controls: Any, wait: Any, plug: Any) ->
     wait(lambda: shown(controls, "device1", "text") == "Blue Pad")
 
     def blue() -> bool:
-        controls.click("device1")  # it may still be moved by the layout
+        click(controls, "device1")  # it may still be moved by the layout
         return bool(controls.window.property("control").property("note") == "Blue Pad")
 
     wait(blue)

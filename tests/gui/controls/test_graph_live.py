@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from control_trees import rows
+from rows import tree_rows
 
 from rosglass.tf import Transform, TransformBroadcaster
 
@@ -19,8 +19,8 @@ STRING = "std_msgs/msg/String"
 def test_topics_and_their_rates(live_controls: Any, wait: Any) -> None:
     publisher = live_controls.robot.create_publisher("/arm/state", STRING)
     live_controls.show('TopicTree { filter: "arm" }')
-    wait(lambda: rows(live_controls, "key") == ["/arm/", "/arm/state"])
-    assert rows(live_controls, "publishedBy")[1] == "/robot"
+    wait(lambda: tree_rows(live_controls, "key") == ["/arm/", "/arm/state"])
+    assert tree_rows(live_controls, "publishedBy")[1] == "/robot"
     live_controls.find("tree").toggled.emit("/arm/state")
 
     def is_measured() -> bool:
@@ -29,7 +29,11 @@ def test_topics_and_their_rates(live_controls: Any, wait: Any) -> None:
 
     wait(is_measured)
     publisher.close()
-    wait(lambda: not rows(live_controls, "key") or rows(live_controls, "publishers")[1] == 0)
+    wait(
+        lambda: (
+            not tree_rows(live_controls, "key") or tree_rows(live_controls, "publishers")[1] == 0
+        )
+    )
 
 
 def test_latched_message_is_shown_and_published_back(live_controls: Any, wait: Any) -> None:
@@ -40,7 +44,7 @@ def test_latched_message_is_shown_and_published_back(live_controls: Any, wait: A
     received: list[Any] = []
     live_controls.robot.create_subscription("/mode", STRING, received.append)
     view = live_controls.show('MessageView { topic: "/mode"; editable: true }')
-    wait(lambda: rows(live_controls, "value") == ["idle"])
+    wait(lambda: tree_rows(live_controls, "value") == ["idle"])
     view.edit_()
     rows_of = live_controls.find("tree").property("model").parent()
     assert rows_of.setText("data", "drive")
@@ -57,10 +61,10 @@ def test_frames_of_two_nodes(live_controls: Any, wait: Any) -> None:
     def is_shown() -> bool:
         stamp = robot.now()
         moving.send_transform(Transform(stamp=stamp, frame_id="odom", child_frame_id="base"))
-        return rows(live_controls, "key") == ["odom", "base"]
+        return tree_rows(live_controls, "key") == ["odom", "base"]
 
     wait(is_shown)
-    wait(lambda: rows(live_controls, "authority")[1] == "/robot")
+    wait(lambda: tree_rows(live_controls, "authority")[1] == "/robot")
 
 
 def test_graph_of_nodes(live_controls: Any, wait: Any) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from hands import centre
+from hands import centre, click
 from ports import free_port
 
 pytestmark = pytest.mark.both_qt
@@ -149,10 +149,10 @@ def test_reason_is_shown_by_a_tap_until_the_next(controls: Any, wait: Any) -> No
     controls.show(f'LiveFrame {{ width: 200; height: 80; title: "Battery"; problem: "{LONG}" }}')
     aside = controls.find("aside")
     wait(lambda: aside.property("truncated"))
-    controls.click("aside")
+    click(controls, "aside")
     hover_away(controls)
     wait(controls.find("asideBalloon").isVisible)
-    controls.click("aside")
+    click(controls, "aside")
     hover_away(controls)
     wait(lambda: not controls.find("asideBalloon").isVisible())
 

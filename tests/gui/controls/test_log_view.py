@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from hands import clipboard, key
 from rows import HOSTILE, rows_of
 
 pytestmark = pytest.mark.both_qt
@@ -133,27 +134,19 @@ def test_hostile_texts_are_plain_and_bounded(shown: Any, controls: Any, wait: An
 
 
 def test_keyboard_selects_copies_and_pauses(shown: Any, controls: Any, wait: Any) -> None:
-    from rosglass.qt import QtCore, QtGui
 
     view, publisher, rows = shown()
     for text in ("one", "two"):
         publisher.publish(level=40, name="/n", msg=text, stamp={"sec": 3})
     wait(lambda: len(rows()) == 2)
     controls.find("rows").forceActiveFocus()
-    app = QtGui.QGuiApplication.instance()
-
-    def press(key: Any, modifiers: Any = QtCore.Qt.KeyboardModifier.NoModifier) -> None:
-        for kind in (QtCore.QEvent.Type.KeyPress, QtCore.QEvent.Type.KeyRelease):
-            app.sendEvent(controls.window, QtGui.QKeyEvent(kind, key, modifiers))
-
-    keys = QtCore.Qt.Key
-    press(keys.Key_End)
-    press(keys.Key_C, QtCore.Qt.KeyboardModifier.ControlModifier)
-    wait(lambda: QtGui.QGuiApplication.clipboard().text() == "3.000 ERROR [/n] two")
-    press(keys.Key_Escape)
+    key(controls, "End")
+    key(controls, "C", control=True)
+    wait(lambda: clipboard() == "3.000 ERROR [/n] two")
+    key(controls, "Escape")
     view.copy()
-    assert QtGui.QGuiApplication.clipboard().text().count("\n") == 1
-    press(keys.Key_P)
+    assert clipboard().count("\n") == 1
+    key(controls, "P")
     assert view.property("paused")
 
 

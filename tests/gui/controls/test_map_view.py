@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from hands import click
 from map_messages import grid, transform
 
 from rosglass.comm import QoS
@@ -425,9 +426,9 @@ def test_buttons_of_a_small_map_are_behind_one(controls: Any, wait: Any) -> None
     bar = controls.find("tools")
     wait(bar.isVisible)
     assert not controls.find("goal").isVisible()
-    controls.click("tools")
+    click(controls, "tools")
     wait(controls.find("goal").isVisible)
-    controls.click("goal")
+    click(controls, "goal")
     wait(lambda: view.property("tool") == "goal")
     # The map is free again for the goal.
     assert not controls.find("goal").isVisible()

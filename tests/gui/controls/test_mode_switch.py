@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import pytest
+from hands import click
 
 from rosglass.comm.qos import QoS
 from rosglass.qt import QtCore, QtGui, optional
@@ -26,7 +27,7 @@ def test_it_shows_the_confirmed_mode_not_the_requested(controls: Any, wait: Any)
     state.publish(data="manual")
     modes = controls.show(MODES)
     wait(lambda: modes.property("note") == "manual")
-    controls.click("mode1")
+    click(controls, "mode1")
     wait(lambda: got == ["auto"])
     assert modes.property("pending")
     assert modes.property("note") == "manual"
@@ -34,7 +35,7 @@ def test_it_shows_the_confirmed_mode_not_the_requested(controls: Any, wait: Any)
     assert outcome(controls) == "auto requested, not confirmed yet"
     wait(lambda: "auto was requested, and not confirmed within 0.4 s" in outcome(controls))
     assert not modes.property("pending")
-    controls.click("mode1")
+    click(controls, "mode1")
     state.publish(data="auto")
     wait(lambda: modes.property("note") == "auto")
     wait(lambda: not modes.property("pending"))
@@ -59,11 +60,11 @@ def test_integers_have_texts(controls: Any, wait: Any) -> None:
         modes: [{ value: 0, text: "standby" }, { value: 1, text: "mow" }, { value: 999 }] }"""
     )
     wait(lambda: modes.property("note") == "standby")
-    controls.click("mode1")
+    click(controls, "mode1")
     wait(lambda: got == [1])
     state.publish(data=1)
     wait(lambda: modes.property("note") == "mow")
-    controls.click("mode2")
+    click(controls, "mode2")
     wait(lambda: "999" in outcome(controls), lambda: outcome(controls))
     assert not modes.property("pending")
     state.close()
@@ -81,7 +82,7 @@ def test_modes_by_services(controls: Any, wait: Any) -> None:
         'modes: ["safe", "auto"] }'
     )
     wait(lambda: modes.property("note") == "safe")
-    controls.click("mode1")
+    click(controls, "mode1")
     wait(lambda: outcome(controls) == "refused: no map")
     server.close()
     state.close()
@@ -91,14 +92,14 @@ def test_a_topic_of_another_type_is_named(controls: Any, wait: Any) -> None:
     keep = controls.robot.create_subscription("/mode", "std_msgs/msg/Bool", lambda _: None)
     controls.show(MODES)
     wait.nothing_happens(0.2)
-    controls.click("mode0")
+    click(controls, "mode0")
     wait(lambda: "std_msgs/msg/Bool, which is not" in outcome(controls))
     keep.close()
 
 
 def test_an_obstacle_is_said(controls: Any) -> None:
     controls.show('ModeSwitch { width: 300; modes: ["a"]; obstacle: "emergency stop" }')
-    controls.click("mode0")
+    click(controls, "mode0")
     assert outcome(controls) == "emergency stop"
 
 
@@ -144,12 +145,12 @@ def test_a_lifecycle_node_is_brought_to_a_state_by_its_transitions(
     lidar = Lifecycle(controls.robot)
     modes = controls.show('ModeSwitch { width: 400; nodeName: "/lidar" }')
     wait(lambda: modes.property("note") == "unconfigured")
-    controls.click("mode2")
+    click(controls, "mode2")
     wait(lambda: modes.property("note") == "active")
     wait(lambda: not modes.property("pending"))
     assert lidar.asked == [1, 3]
     lidar.refuses = True
-    controls.click("mode1")
+    click(controls, "mode1")
     wait(lambda: outcome(controls) == "refused: /lidar did not become inactive")
     assert modes.property("note") == "active"
     lidar.close()
@@ -159,7 +160,7 @@ def test_a_lifecycle_node_is_brought_to_a_state_by_its_transitions(
 def test_a_lifecycle_node_that_is_missing_is_named(controls: Any, wait: Any) -> None:
     modes = controls.show('ModeSwitch { width: 400; nodeName: "/lidar" }')
     wait(lambda: "/lidar/get_state" in modes.property("status"), timeout=20)
-    controls.click("mode2")
+    click(controls, "mode2")
     assert "unknown" in outcome(controls)
 
 
@@ -182,7 +183,7 @@ def test_modes_over_a_real_middleware(live_controls: Any, wait: Any) -> None:
     state.publish(data="manual")
     modes = controls.show('ModeSwitch { width: 300; modes: ["manual", "auto"] }')
     wait(lambda: modes.property("note") == "manual")
-    controls.click("mode1")
+    click(controls, "mode1")
     wait(lambda: modes.property("note") == "auto" and not modes.property("pending"))
     keep.close()
     state.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from control_trees import clipboard, press
+from hands import clipboard, key
 
 STRING = "std_msgs/msg/String"
 pytestmark = pytest.mark.both_qt
@@ -64,19 +64,19 @@ def test_keys_select_zoom_and_copy(controls: Any, wait: Any) -> None:
     view = controls.show('NodeGraph { filter: "image" }')
     wait(lambda: len(items(controls)) == 2)
     controls.find("area").forceActiveFocus()
-    press(controls, "Right")
+    key(controls, "Right")
     assert view.property("selected") == "/robot"
-    press(controls, "Right")
+    key(controls, "Right")
     assert view.property("selected") == "/image"
     assert "from /robot to no subscriber" in controls.find("detail").property("text")
-    press(controls, "C", control=True)
+    key(controls, "C", control=True)
     assert clipboard() == "/image"
     before = controls.find("canvas").scale()
-    press(controls, "Minus")
+    key(controls, "Minus")
     assert controls.find("canvas").scale() == pytest.approx(0.8 * before)
-    press(controls, "0")
+    key(controls, "0")
     assert controls.find("canvas").scale() == before
-    press(controls, "Escape")
+    key(controls, "Escape")
     assert view.property("selected") == ""
 
 

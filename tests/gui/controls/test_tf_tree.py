@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from control_trees import clipboard, press, rows
+from hands import clipboard, key
+from rows import tree_rows
 
 from rosglass.tf import StaticTransformBroadcaster, Transform, TransformBroadcaster
 
@@ -23,14 +24,16 @@ def test_frames_are_a_tree_with_ages(controls: Any, wait: Any) -> None:
     wait(moving.publisher.subscription_count)
     static.send_transform(transform(robot, "base", "laser"))
     moving.send_transform(transform(robot, "odom", "base"))
-    wait(lambda: rows(controls, "key") == ["odom", "base", "laser"])
-    found = {row[0]: row[1:] for row in rows(controls, "key", "depth", "isStatic", "age", "isOld")}
+    wait(lambda: tree_rows(controls, "key") == ["odom", "base", "laser"])
+    found = {
+        row[0]: row[1:] for row in tree_rows(controls, "key", "depth", "isStatic", "age", "isOld")
+    }
     assert found["odom"] == (0, False, -1.0, False)
     assert found["laser"][:3] == (2, True, -1.0)
     assert found["base"][2] >= 0
     assert "3 frames" in view.property("note")
     view.setProperty("timeout", 200)
-    wait(lambda: dict(rows(controls, "key", "isOld"))["base"])
+    wait(lambda: dict(tree_rows(controls, "key", "isOld"))["base"])
     assert "1 old" in view.property("note")
 
 
@@ -43,7 +46,7 @@ def test_two_parents_are_in_words(controls: Any, wait: Any) -> None:
     def send() -> str:
         wheels.send_transform(transform(controls.robot, "odom", "base"))
         amcl.send_transform(transform(other, "map", "base"))
-        return dict(rows(controls, "key", "fault")).get("base", "")
+        return dict(tree_rows(controls, "key", "fault")).get("base", "")
 
     wait(send)
     assert "from /robot" in send()
@@ -57,9 +60,9 @@ def test_a_cycle_is_in_words(controls: Any, wait: Any) -> None:
     controls.show("TfTree {}")
     wait(moving.publisher.subscription_count)
     moving.send_transform(transform(robot, "a", "b"))
-    wait(lambda: rows(controls, "key") == ["a", "b"])
+    wait(lambda: tree_rows(controls, "key") == ["a", "b"])
     moving.send_transform(transform(robot, "b", "a"))
-    wait(lambda: "a in b in a" in dict(rows(controls, "key", "fault"))["a"])
+    wait(lambda: "a in b in a" in dict(tree_rows(controls, "key", "fault"))["a"])
 
 
 def test_frames_are_filtered_with_their_parents(controls: Any, wait: Any) -> None:
@@ -68,12 +71,12 @@ def test_frames_are_filtered_with_their_parents(controls: Any, wait: Any) -> Non
     view = controls.show("TfTree {}")
     for number in range(5):
         static.send_transform(transform(robot, "base", f"wheel{number}"))
-    wait(lambda: len(rows(controls, "key")) == 6)
+    wait(lambda: len(tree_rows(controls, "key")) == 6)
     view.setProperty("filter", "WHEEL3")
-    assert rows(controls, "key") == ["base", "wheel3"]
+    assert tree_rows(controls, "key") == ["base", "wheel3"]
     controls.find("rows").forceActiveFocus()
-    press(controls, "End")
-    press(controls, "C", control=True)
+    key(controls, "End")
+    key(controls, "C", control=True)
     assert clipboard() == "wheel3"
     assert view.property("selected") == "wheel3"
 
@@ -88,5 +91,5 @@ def test_a_deep_tree_is_shown(controls: Any, wait: Any) -> None:
     static.send_transform(
         [transform(controls.robot, f"f{at:03}", f"f{at + 1:03}") for at in range(900)]
     )
-    wait(lambda: len(rows(controls, "key")) == 901)
-    assert rows(controls, "depth")[-1] == 900
+    wait(lambda: len(tree_rows(controls, "key")) == 901)
+    assert tree_rows(controls, "depth")[-1] == 900

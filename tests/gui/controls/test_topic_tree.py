@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from control_trees import clipboard, press, rows
+from hands import clipboard, key
+from rows import tree_rows
 
 STRING, TWIST = "std_msgs/msg/String", "geometry_msgs/msg/Twist"
 pytestmark = pytest.mark.both_qt
@@ -15,13 +16,13 @@ def test_topics_are_a_tree_by_namespace(controls: Any, wait: Any) -> None:
     for name in ("/arm/left/state", "/arm/state", "/odom", "/arm"):
         controls.robot.create_publisher(name, STRING)
     view = controls.show("TopicTree { filter: STRING }".replace("STRING", '"String"'))
-    wait(lambda: len(rows(controls, "key")) == 6)
-    assert rows(controls, "name", "depth") == [
+    wait(lambda: len(tree_rows(controls, "key")) == 6)
+    assert tree_rows(controls, "name", "depth") == [
         ("arm", 0), ("arm", 0), ("left", 1), ("state", 2), ("state", 1), ("odom", 0),
     ]  # fmt: skip
-    assert rows(controls, "topics")[1] == 2
-    assert rows(controls, "type")[0] == STRING
-    assert rows(controls, "publishers", "subscribers")[0] == (1, 0)
+    assert tree_rows(controls, "topics")[1] == 2
+    assert tree_rows(controls, "type")[0] == STRING
+    assert tree_rows(controls, "publishers", "subscribers")[0] == (1, 0)
     assert "4 topics" in view.property("note")
 
 
@@ -29,15 +30,15 @@ def test_a_topic_that_appears_or_goes_changes_only_its_row(controls: Any, wait: 
     controls.robot.create_publisher("/a", STRING)
     controls.robot.create_publisher("/c", STRING)
     controls.show('TopicTree { ns: "/" }')
-    wait(lambda: "/c" in rows(controls, "key"))
+    wait(lambda: "/c" in tree_rows(controls, "key"))
     resets: list[None] = []
     model = controls.find("tree").property("model")
     count = lambda: resets.append(None)  # noqa: E731 - methods change metaobjects
     model.modelReset.connect(count)
     publisher = controls.robot.create_publisher("/b", STRING)
-    wait(lambda: "/b" in rows(controls, "key"))
+    wait(lambda: "/b" in tree_rows(controls, "key"))
     publisher.close()
-    wait(lambda: "/b" not in rows(controls, "key"))
+    wait(lambda: "/b" not in tree_rows(controls, "key"))
     assert resets == []
 
 
@@ -50,8 +51,8 @@ def test_conflicts_are_in_words(controls: Any, wait: Any) -> None:
     controls.robot.create_publisher("/speed", STRING)
     other.create_publisher("/speed", TWIST)
     controls.show("TopicTree {}")
-    wait(lambda: len([text for text in rows(controls, "conflict") if text]) == 2)
-    found = dict(rows(controls, "key", "conflict"))
+    wait(lambda: len([text for text in tree_rows(controls, "conflict") if text]) == 2)
+    found = dict(tree_rows(controls, "key", "conflict"))
     assert found["/image"] == (
         "/viewer may get nothing from /robot: reliability: reliable requested, best effort offered"
     )
@@ -62,11 +63,11 @@ def test_conflicts_are_in_words(controls: Any, wait: Any) -> None:
 def test_only_unfolded_topics_are_received(controls: Any, wait: Any) -> None:
     publisher = controls.robot.create_publisher("/chat", STRING)
     view = controls.show('TopicTree { filter: "chat" }')
-    wait(lambda: rows(controls, "key") == ["/chat"])
+    wait(lambda: tree_rows(controls, "key") == ["/chat"])
     assert publisher.subscription_count() == 0
     tree = controls.find("tree")
     controls.find("rows").forceActiveFocus()
-    press(controls, "Right")
+    key(controls, "Right")
     wait(publisher.subscription_count)
 
     def is_measured() -> bool:
@@ -76,21 +77,21 @@ def test_only_unfolded_topics_are_received(controls: Any, wait: Any) -> None:
     wait(is_measured)
     assert view.property("selected") == "/chat"
     assert tree.property("current") == "/chat"
-    press(controls, "Left")
+    key(controls, "Left")
     wait(lambda: publisher.subscription_count() == 0)
 
 
 def test_topics_are_copied_by_keyboard(controls: Any, wait: Any) -> None:
     controls.robot.create_publisher("/arm/state", STRING)
     view = controls.show('TopicTree { filter: "arm" }')
-    wait(lambda: len(rows(controls, "key")) == 2)
+    wait(lambda: len(tree_rows(controls, "key")) == 2)
     controls.find("rows").forceActiveFocus()
-    press(controls, "Down")
-    press(controls, "C", control=True)
+    key(controls, "Down")
+    key(controls, "C", control=True)
     assert clipboard() == "/arm/state"
-    press(controls, "Left")
+    key(controls, "Left")
     assert controls.find("tree").property("current") == "/arm/"
-    press(controls, "Left")
+    key(controls, "Left")
     assert view.property("selected") == ""
 
 
@@ -100,11 +101,11 @@ def test_two_thousand_topics(controls: Any, wait: Any) -> None:
         for number in range(2000)
     ]
     view = controls.show("TopicTree {}")
-    wait(lambda: len(rows(controls, "key")) >= 2050)
+    wait(lambda: len(tree_rows(controls, "key")) >= 2050)
     # A list makes only what is in view.
     assert len(controls.find("rows").property("contentItem").childItems()) < 60
     view.setProperty("filter", "topic1999")
-    wait(lambda: rows(controls, "key") == ["/robot49/", "/robot49/topic1999"])
+    wait(lambda: tree_rows(controls, "key") == ["/robot49/", "/robot49/topic1999"])
     assert len(made) == 2000
 
 
@@ -113,8 +114,8 @@ def test_a_lost_connection_is_said(controls: Any, wait: Any) -> None:
 
     controls.robot.create_publisher("/chat", STRING)
     view = controls.show("TopicTree {}")
-    wait(lambda: "/chat" in rows(controls, "key"))
+    wait(lambda: "/chat" in tree_rows(controls, "key"))
     controls.bench.session.node.set_status(ConnectionState.LOST, "no router")
     wait(lambda: "not connected" in view.property("status"))
     assert view.property("stale")
-    assert "/chat" in rows(controls, "key")
+    assert "/chat" in tree_rows(controls, "key")
