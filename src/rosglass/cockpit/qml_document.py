@@ -144,6 +144,8 @@ class Document:
             raise ArgumentError(
                 "name", name, f"a property: in line {self._line(member)} is a {member.form}"
             )
+        if member is not None and member.type == "alias" and not isinstance(value, Code):
+            raise ArgumentError("value", value, f"the name of a property, as {name} is an alias")
         text, closed = self._value_text(value)
         if member is None:
             return self._add_property(target, name, text, closed)
@@ -292,9 +294,8 @@ class Document:
         member = target.member
         if member is None:
             return self._splice([self._removal(self._holder(target), target, comments=True)])
-        if member.form == "list" and len(member.objects) > 1:
-            return self._splice(self._list_removal(member, target))
-        return self._remove_member(member)
+        splices = self._list_removal(member, target) if member.form == "list" else []
+        return self._splice(splices) if splices else self._remove_member(member)
 
     def move_object(
         self,
@@ -587,7 +588,10 @@ class Document:
         """Return where the comments directly above an item start, or the item itself."""
         index = owner.items.index(item)
         previous = owner.items[index - 1].span.end if index else owner.body.start + 1
-        start = item.span.start
+        return self._first_comment(previous, item.span.start)
+
+    def _first_comment(self, previous: int, start: int) -> int:
+        """Return where the comments directly above an offset start, or the offset itself."""
         comments = list(_COMMENT.finditer(self.text, self._rest_of_line(previous)[0], start))
         for found in reversed(comments):
             if len(_NEWLINE.findall(self.text, found.end(), start)) > 1:
@@ -656,6 +660,12 @@ class Document:
         if target.member is None:
             start = self._leading(self._holder(target), target)
             end = self._rest_of_line(end)[0]
+        elif target.member.form == "list":
+            start, comma, behind = self._list_place(target.member, target)
+            trail = self._rest_of_line(behind)[0]
+            comments = f"{self.text[end:comma].strip()} {self.text[behind:trail].strip()}".strip()
+            text = self._unindented(start, end, target.span.start)
+            return f"{text} {comments}" if comments else text
         return self._unindented(start, end, target.span.start)
 
     def _indented(self, block: str, indent: str) -> str:
@@ -843,17 +853,31 @@ class Document:
                 first = self._next_line(at)
         return first, last, ""
 
-    def _list_removal(self, member: Member, target: Object) -> list[tuple[int, int, str]]:
+    def _list_place(self, member: Member, target: Object) -> tuple[int, int, int]:
+        """Return where an object of a list, its comma, and what is behind it start."""
+        assert member.value_span is not None
         index = member.objects.index(target)
-        start, end = target.span
-        splices = []
+        previous = member.value_span.start + 1
+        if index:
+            previous = self._scan._skip(member.objects[index - 1].span.end)[0] + 1
+        start, end = self._first_comment(previous, target.span.start), target.span.end
         comma = self._scan._skip(end)[0]
-        if self.text.startswith(",", comma):
-            end = comma + 1
-        elif index:
+        return (start, comma, comma + 1) if self.text[comma] == "," else (start, end, end)
+
+    def _list_removal(self, member: Member, target: Object) -> list[tuple[int, int, str]]:
+        """Return the removal of an object from a list; none if nothing else is in the list."""
+        assert member.value_span is not None
+        start, comma, end = self._list_place(member, target)
+        trail, _, ended = self._rest_of_line(end)
+        splices = []
+        index = member.objects.index(target)
+        if comma == end and index:
             comma = self._scan._skip(member.objects[index - 1].span.end)[0]
             splices.append((comma, comma + 1, ""))
-        trail, _, ended = self._rest_of_line(end)
+        around = self.text[member.value_span.start + 1 : start]
+        around += self.text[trail : member.value_span.end - 1]
+        if not around.strip():
+            return []
         if self._starts_line(start) and ended:
             splices.append((self._line_start(start), self._next_line(trail), ""))
         else:

@@ -168,6 +168,9 @@ class TestProperties:
         for name in ("", "a b", "a: 1; b", "1a", "a."):
             with pytest.raises(ArgumentError, match="name: expected"):
                 layout.set_property(front, name, 1)
+        alias = Document("Item { property alias a: b.c }")
+        with pytest.raises(ArgumentError, match="as a is an alias"):
+            alias.set_property(alias.root, "a", 1, overwrite=True)
         for value in (2**60, object(), b"", {1: 2}):
             with pytest.raises(ArgumentError, match="value: expected"):
                 layout.set_property(front, "share", value)
@@ -228,7 +231,16 @@ class TestObjects:
         document = Document(f"Item {{\n    {states}\n    l: [A {{}}, B {{}}]\n}}\n")
         a, b, c, d = document.root.objects
         assert "[\n        // b\n        B {}\n    ]" in document.remove_object(a).text
-        assert "[\n        A {} // a\n        // b\n    ]" in document.remove_object(b).text
+        assert "[\n        A {} // a\n    ]" in document.remove_object(b).text
+        moved = document.move_object(a, document.root)
+        assert moved.text.endswith("    A {} // a\n}\n")
+        moved = moved.move_object(moved.root.objects[0], moved.root, 0)
+        assert "Item {\n    // b\n    B {}\n    A {} // a\n" in moved.text.replace(
+            "    l: [A {}, B {}]\n", ""
+        )
+        kept = Document("Item {\n    states: [\n        A {},\n\n        // later\n    ]\n}\n")
+        kept = kept.remove_object(kept.root.objects[0])
+        assert kept.text == "Item {\n    states: [\n\n        // later\n    ]\n}\n"
         assert "l: [B {}]" in document.remove_object(c).text
         after = document.remove_object(d)
         assert "l: [A {}]" in after.text

@@ -120,7 +120,8 @@ class Editor:
 
     def _with_value(self, target: Object) -> Member | None:
         found = [item for item in target.members if item.form == "value" and item.value_span]
-        found = [item for item in found if item.name != "id" and target.get(item.name) is item]
+        found = [item for item in found if item.name != "id" and item.type != "alias"]
+        found = [item for item in found if target.get(item.name) is item]
         return self.random.choice(found) if found else None
 
     def _value(self, document: Document, target: Object) -> Document:
