@@ -25,7 +25,7 @@ apt_demo=(xvfb xauth libegl1 libgl1 libopengl0 libxkbcommon-x11-0 libdbus-1-3 li
 # network for DDS, Fast DDS to talk to, and ROS 1 itself: master, tools, rospy, roscpp, actionlib,
 # catkin; Vulkan on the processor for the 3D view; accessibility as a screen reader sees it.
 apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps
-          iproute2 util-linux g++ pkg-config libfastrtps-dev
+          iproute2 util-linux g++ python3-dev pkg-config libfastrtps-dev
           python3-rosmaster python3-roslaunch rosout python3-rospy python3-actionlib
           python3-rostopic python3-rosservice python3-rosparam python3-rosnode python3-rosbag
           python3-rosmsg python3-std-msgs python3-std-srvs python3-geometry-msgs
@@ -114,6 +114,17 @@ make_rclpy_venv() {
   printf '%s\n' "$wanted" >"$dir/.rosglass"
 }
 
+# A second parser of QML to compare the cockpit's with. It has to be compiled: where that is not possible,
+# its tests are skipped.
+oracle_packages=(tree-sitter==0.26.1 tree-sitter-qmljs==0.3.1)
+add_oracle() {
+  local dir=.venv wanted="${oracle_packages[*]}"
+  [ "$(cat "$dir/.oracle" 2>/dev/null)" = "$wanted" ] && return
+  if "$dir/bin/python" -m pip install --disable-pip-version-check --quiet "${oracle_packages[@]}" >.stamps/oracle.log 2>&1
+  then printf '%s\n' "$wanted" >"$dir/.oracle"
+  else say "tree-sitter-qmljs could not be installed (.stamps/oracle.log): its tests are skipped"; fi
+}
+
 python=${PYTHON:-python3}
 system_extras=zenoh,dds,bags,completion,images,test,peers
 case $purpose in
@@ -147,6 +158,7 @@ case $purpose in
     trap 'kill -- "-$beside" 2>/dev/null || true' EXIT
     make_venv .venv "$python" dev
     touch .venv/.rosglass-dev
+    add_oracle
     wait "$beside" ;;
 esac
 say "set-up complete"

@@ -12,10 +12,10 @@ import rosglass
 from rosglass.cockpit.qml_scanner import Member, Object, Scanner
 
 tree_sitter = pytest.importorskip(
-    "tree_sitter", reason="install tree-sitter and tree-sitter-qmljs, which needs a C compiler"
+    "tree_sitter", reason="scripts/setup.sh test could not install it"
 )
 grammar = pytest.importorskip(
-    "tree_sitter_qmljs", reason="install tree-sitter-qmljs, which needs a C compiler"
+    "tree_sitter_qmljs", reason="scripts/setup.sh test could not compile it"
 )
 
 ROOT = Path(rosglass.__file__).parents[2]
