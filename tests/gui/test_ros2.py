@@ -323,7 +323,7 @@ def test_the_graph_can_be_asked(running: Any, wait: Any) -> None:
             Ros2.queryTopics("std_msgs/msg/Nothing"), Ros2.queryTopicInfo()[1],
             Ros2.getTopicTypes("a"), Ros2.queryTopicTypes("/b"), Ros2.getTopicNamesAndTypes()["/b"],
             Ros2.getTopicTypes("/none"), Ros2.isValidTopic("/a/b"), Ros2.isValidTopic("a b"),
-            Ros2.isValidTopic("")]"""
+            Ros2.isValidTopic(""), Ros2.getTopicTypes(""), Ros2.getServiceTypes("")]"""
     )
     text, number = "std_msgs/msg/String", "std_msgs/msg/Int32"
     assert shown == [
@@ -338,6 +338,8 @@ def test_the_graph_can_be_asked(running: Any, wait: Any) -> None:
         True,
         False,
         False,
+        [],  # the field of an interface is still empty
+        [],
     ]
 
 

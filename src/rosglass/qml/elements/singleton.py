@@ -366,6 +366,8 @@ class GraphSingleton(RosSingleton):
 
     def _types(self, what: str, name: str, known: dict[str, list[str]]) -> list[str]:
         node = self._node(what)
+        if not name:  # a field that is still empty
+            return []
         try:
             types = known.get(node.resolve(name), []) if node is not None else []
         except Error as error:
