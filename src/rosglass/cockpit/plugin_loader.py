@@ -21,6 +21,7 @@ from rosglass.qml.engine.watchdog import Watchdog
 from rosglass.qml.run.live_file import create, register_imports
 from rosglass.qml.run.load_errors import error_list
 from rosglass.qml.run.modules import interface_file
+from rosglass.qml.run.renderer_choice import imported_modules
 from rosglass.qt import QT6, QJSValue, QtCore, QtQml, QtQuick, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ __all__ = ["PluginLoader"]
 
 #: RQml's own QML modules, for where RQml is not installed: searched after all other folders.
 _MODULES = Path(__file__).parent / "rqml_modules"
+#: The item around plugins that import the Material style, and the name of that module.
+_LOOK, _MATERIAL = Path(__file__).parent / "rqml_look/MaterialLook.qml", "QtQuick.Controls.Material"
 #: Milliseconds: a plugin asks for topics and services once, when it is loaded. So it is loaded
 #: when the graph has not changed for a while, or at last after a longer one.
 _QUIET_MS, _MAX_WAIT_MS = 400, 3000
@@ -83,6 +86,7 @@ class PluginLoader(QtQuick.QQuickItem):
     def __init__(self, parent: QtQuick.QQuickItem | None = None) -> None:
         super().__init__(parent)
         self._root: Any = None
+        self._look: QtQuick.QQuickItem | None = None
         self._component: QtQml.QQmlComponent | None = None
         self._context: QtQml.QQmlContext | None = None
         self._map: PluginContext | None = None
@@ -104,7 +108,9 @@ class PluginLoader(QtQuick.QQuickItem):
             if detach is not None:
                 detach()
             # PySide 6.11 never frees the Python half of an object created by QML.
-            state.update(_root=None, _component=None, _context=None, _map=None, _engine=None)
+            state.update(
+                _root=None, _look=None, _component=None, _context=None, _map=None, _engine=None
+            )
             state.update(_runtime=None, _detach=None, _values=None, _colors=None)
 
         self.destroyed.connect(gone)
@@ -228,6 +234,7 @@ class PluginLoader(QtQuick.QQuickItem):
         context.setContextProperty("context", self._map.map)
         context.setContextProperty("uniqueName", self.name or f"{file.stem}_{next(_numbers)}")
         context.setContextProperty("RQml", api)
+        self._make_look(engine, file)
         component = self._component = QtQml.QQmlComponent(
             engine, QtCore.QUrl.fromLocalFile(str(file)), self
         )
@@ -256,8 +263,20 @@ class PluginLoader(QtQuick.QQuickItem):
         self._root = root
         root.setParent(self)
         if isinstance(root, QtQuick.QQuickItem):
-            root.setParentItem(self)
+            root.setParentItem(self._look or self)
             self._fit()
+
+    def _make_look(self, engine: QtQml.QQmlEngine, file: Path) -> None:
+        """Make the item around a plugin that imports the Material style, which has no palette."""
+        if _MATERIAL not in imported_modules(file, engine.importPathList()):
+            return
+        component = QtQml.QQmlComponent(engine, QtCore.QUrl.fromLocalFile(str(_LOOK)), self)
+        made = component.create()
+        if isinstance(made, QtQuick.QQuickItem):
+            made.setParent(self)
+            made.setParentItem(self)
+            self._look = made
+            self._on_colors()
 
     def _find(self, outer: QtQml.QQmlContext | None) -> Path:
         """Return the plugin's file.
@@ -297,6 +316,7 @@ class PluginLoader(QtQuick.QQuickItem):
 
     def _unload(self) -> None:
         root, component, context = self._root, self._component, self._context
+        look, self._look = self._look, None
         self._root = self._component = self._context = None
         if is_alive(root):
             if isinstance(root, QtQuick.QQuickItem):
@@ -310,13 +330,15 @@ class PluginLoader(QtQuick.QQuickItem):
             for item in (component, context):
                 if item is not None and is_alive(item):
                     item.deleteLater()
+        if look is not None and is_alive(look):
+            look.deleteLater()
         report(self, leastWidth=0.0, leastHeight=0.0)
 
     @Slot()
     def _fit(self) -> None:
-        root = self._root
-        if is_alive(root) and isinstance(root, QtQuick.QQuickItem):
-            root.setSize(QtCore.QSizeF(self.width(), self.height()))
+        for item in (self._look, self._root):
+            if is_alive(item) and isinstance(item, QtQuick.QQuickItem):
+                item.setSize(QtCore.QSizeF(self.width(), self.height()))
 
     # Its context.
 
@@ -367,6 +389,8 @@ class PluginLoader(QtQuick.QQuickItem):
             for role, color in colors.items() if item is not None else ():
                 place: Any = QtQml.QQmlProperty(item, f"palette.{role}", engine)
                 place.write(color)
+        if self._look is not None and is_alive(self._look):
+            self._look.setProperty("colors", self.colors)
 
     @Slot()
     def _on_window(self) -> None:
@@ -381,7 +405,8 @@ class PluginLoader(QtQuick.QQuickItem):
             return
         for warning in warnings:
             place = plain_path(warning.url().toString())
-            if self._is_ours(warning, place):
+            # Qt's remarks, such as on loops of bindings, are in the log.
+            if "Error:" in warning.description() and self._is_ours(warning, place):
                 self._complain(f"{place}:{max(warning.line(), 0)}: {warning.description()}")
 
     def _is_ours(self, warning: QtQml.QQmlError, place: str) -> bool:

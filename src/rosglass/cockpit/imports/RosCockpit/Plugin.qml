@@ -95,8 +95,9 @@ FocusScope {
             anchors { left: parent.left; right: hide.left; verticalCenter: parent.verticalCenter; margins: Theme.gap / 2 }
             font.pixelSize: Theme.small
             color: Theme.warn
+            maximumLineCount: 1
             text: (loader.complaints > 1 ? qsTr("%1 errors in this plugin, the last: ").arg(loader.complaints)
-                : qsTr("An error in this plugin: ")) + loader.complaint.replace(/^.*\//, "")
+                : qsTr("An error in this plugin: ")) + loader.complaint.replace(/^\S*\//, "").replace(/\s+/g, " ")
         }
         ThemeButton {
             id: hide
