@@ -166,13 +166,16 @@ Item {
             anchors.fill: parent
             color: Theme.panel
             radius: Theme.radius / 2
+            border { color: panel.current_ ? Theme.faint : Theme.edge; width: 1 }
         }
+        // Only then: whatever changes below it is painted again with it.
         Rectangle {
             z: 2
             anchors.fill: parent
+            visible: panel.wrong_
             radius: Theme.radius / 2
             color: "transparent"
-            border { color: panel.wrong_ ? Theme.bad : panel.current_ ? Theme.faint : Theme.edge; width: panel.wrong_ ? 2 : 1 }
+            border { color: Theme.bad; width: 2 }
         }
         PanelTitle {
             id: bar
