@@ -410,6 +410,7 @@ WAYS: dict[str, Way] = {
     "interface reloaded": Way(press, _reload),
     "error in QML": Way(push, _asks("set('window', 'wrong', True)")),
     "screen frozen for 1 s": Way(drag, _asks("time.sleep(1)"), limit_s=0.2),
+    "Python at work for 1 s": Way(drag, _asks("work(1)"), limit_s=0.2),
     "another robot selected": Way(drag, _asks("set('command', 'ns', '/b')")),
     "reconnected": Way(press, _asks("reconnect()")),
     "input destroyed": Way(push, _asks("set('loader', 'active', False)")),
@@ -578,7 +579,14 @@ def main(file: str, url: str) -> int:
         item("window").requestActivate()
         timer.start(20)
 
+    def work(seconds: float) -> None:
+        """Keep Python's lock, which other threads get only by asking for it."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            pass
+
     names = {
+        "work": work,
         "panel": lambda: item("panels").property("item"),
         "pads": pads,
         "plug": plug,

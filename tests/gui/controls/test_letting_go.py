@@ -89,6 +89,23 @@ def test_letting_go(name: str, screens: Any, robot: Robot) -> None:
         screens.close()
 
 
+@pytest.mark.skipif(not QT6, reason="Qt 5 ends the process at once, without any code of ours")
+def test_losing_the_display(url: str, robot: Robot, tmp_path: Path) -> None:
+    """The X server ends, or the connection of ssh -X is lost: Qt ends the program."""
+    with VirtualScreen() as display:
+        program = Screen(url, display.display, tmp_path)
+        try:
+            program.reset()
+            drag(program)
+            eventually(lambda: robot.moves)
+            robot.received.clear()
+            display.close()
+            eventually(lambda: not program.is_running())
+            eventually(lambda: robot.zeros >= 3)
+        finally:
+            program.close()
+
+
 @pytest.mark.skipif(not QT6, reason="the wire, not Qt, is what matters")
 @pytest.mark.parametrize("outage_s", [0.5, 3.0])
 def test_letting_go_during_an_outage(outage_s: float, screen: str, tmp_path: Path) -> None:
