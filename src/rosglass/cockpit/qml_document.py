@@ -443,7 +443,8 @@ class Document:
         if after is None and self._scan.pragmas:
             after = self._scan.pragmas[-1]
         if after is not None:
-            at, _, ended = self._rest_of_line(after.end)
+            at, follower, ended = self._rest_of_line(after.end)
+            at = follower if ended else at
             return self._splice(
                 [(at, at, f"{self._newline}{line}{'' if ended else self._newline}")]
             )
@@ -709,7 +710,8 @@ class Document:
         at, follower, ended = self._rest_of_line(behind)
         newline = self._newline
         if ended:
-            indent = self._child_indent(owner, after)
+            # Behind blanks at the end of the line, so that it stays as it is.
+            at, indent = follower, self._child_indent(owner, after)
             blank = newline if isinstance(after, Object) and self._spaced(owner) else ""
             return self._splice(
                 [(at, at, f"{blank}{newline}{indent}{self._indented(text, indent)}")]

@@ -173,7 +173,6 @@ class Object:
         parent: The object around it; None for the root. Groups are left out.
         member: The member whose value it is; None for a child.
         on: The property that ``Behavior on x {}`` modifies; empty without.
-        closed: True, as for members that end with a bracket.
         items: Members and children, in the order of the text.
         objects: Children and objects that are values, in the order of the text, those in groups
             included; each has this object as its parent.
@@ -186,7 +185,6 @@ class Object:
     parent: Object | None = field(default=None, repr=False)
     member: Member | None = field(default=None, repr=False)
     on: str = ""
-    closed: bool = True
     items: list[Member | Object] = field(default_factory=list, repr=False)
     objects: list[Object] = field(default_factory=list, repr=False)
 
@@ -210,6 +208,11 @@ class Object:
         """Its id; empty without one."""
         member = self.get("id")
         return member.text if member is not None else ""
+
+    @property
+    def closed(self) -> bool:
+        """True, as for members that end with a bracket."""
+        return True
 
     @property
     def path(self) -> tuple[int, ...]:

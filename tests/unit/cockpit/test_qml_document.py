@@ -121,6 +121,13 @@ class TestProperties:
             "+                } // here",
         ]
 
+    def test_blanks_at_the_ends_of_lines_stay(self) -> None:
+        document = Document("import QtQuick  \n\nItem {  \n    x: 1 // m \n}\n")
+        after = document.set_property(document.root, "y", 2).add_import("QtA")
+        assert change(document, after) == ["+import QtA", "+    y: 2"]
+        after = document.set_id(document.root, "a")
+        assert change(document, after) == ["+    id: a"]
+
     def test_group_gets_its_own(self) -> None:
         document = Document("Item {\n    anchors { fill: parent }\n    font {\n    }\n}\n")
         after = document.set_property(document.root, "anchors.margins", 4)
