@@ -7,6 +7,7 @@ import signal
 import subprocess
 import threading
 import time
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -106,34 +107,42 @@ def test_losing_the_display(url: str, robot: Robot, tmp_path: Path) -> None:
             program.close()
 
 
-@pytest.mark.skipif(not QT6, reason="the wire, not Qt, is what matters")
-@pytest.mark.parametrize("outage_s", [0.5, 3.0])
-def test_letting_go_during_an_outage(outage_s: float, screen: str, tmp_path: Path) -> None:
-    """The link stalls, and delivers later what was sent: the last of it is a zero."""
+@contextmanager
+def driving_over_a_stalled_link(screen: str, folder: Path) -> Iterator[tuple[Robot, Relay, Screen]]:
+    """A screen whose stick is dragged, over a link that delivers nothing until it is resumed."""
     port = free_port()
     with Router(f"tcp/127.0.0.1:{port}") as router, Relay(port) as relay, stays_connected(screen):
         node = rosglass.connect(router.url, "robot")
         robot = Robot(node)
-        program = Screen(f"zenoh://127.0.0.1:{relay.port}?mode=client", screen, tmp_path)
+        program = Screen(f"zenoh://127.0.0.1:{relay.port}?mode=client", screen, folder)
         try:
             program.reset()
             drag(program)
             eventually(lambda: robot.moves)
             relay.stall()
-            nothing_happens(0.1)
-            program.x11("mouseup", 1)
-            nothing_happens(outage_s)
-            robot.received.clear()
-            relay.resume()
-            eventually(lambda: robot.zeros >= 3, lambda: (robot.received, program.text))
-            nothing_happens(1.5)
-            assert robot.zeros >= 3
-            moving = sum(speed > 0 for _, speed in robot.received)
-            assert moving < 15, "what was sent before the outage was noticed; 20 a second"
+            yield robot, relay, program
         finally:
             relay.resume()
+            program.signal(signal.SIGCONT)
             program.close()
             node.close()
+
+
+@pytest.mark.skipif(not QT6, reason="the wire, not Qt, is what matters")
+@pytest.mark.parametrize("outage_s", [0.5, 3.0])
+def test_letting_go_during_an_outage(outage_s: float, screen: str, tmp_path: Path) -> None:
+    """The link stalls, and delivers later what was sent: the last of it is a zero."""
+    with driving_over_a_stalled_link(screen, tmp_path) as (robot, relay, program):
+        nothing_happens(0.1)
+        program.x11("mouseup", 1)
+        nothing_happens(outage_s)
+        robot.received.clear()
+        relay.resume()
+        eventually(lambda: robot.zeros >= 3, lambda: (robot.received, program.text))
+        nothing_happens(1.5)
+        assert robot.zeros >= 3
+        moving = sum(speed > 0 for _, speed in robot.received)
+        assert moving < 15, "what was sent before the outage was noticed; 20 a second"
 
 
 @pytest.mark.skipif(not QT6, reason="the wire, not Qt, is what matters")
@@ -142,34 +151,20 @@ def test_letting_go_while_link_and_screen_stand_still(
     first: str, screen: str, tmp_path: Path
 ) -> None:
     """Both go on later, one before the other: nothing old is repeated, and zeros follow."""
-    port = free_port()
-    with Router(f"tcp/127.0.0.1:{port}") as router, Relay(port) as relay, stays_connected(screen):
-        node = rosglass.connect(router.url, "robot")
-        robot = Robot(node)
-        program = Screen(f"zenoh://127.0.0.1:{relay.port}?mode=client", screen, tmp_path)
-        try:
-            program.reset()
-            drag(program)
-            eventually(lambda: robot.moves)
-            relay.stall()
-            program.signal(signal.SIGSTOP)
-            program.x11("mouseup", 1)
-            nothing_happens(1.0)
-            robot.received.clear()
-            steps = [relay.resume, lambda: program.signal(signal.SIGCONT)]
-            for step in steps if first == "link" else reversed(steps):
-                step()
-                nothing_happens(0.3)
-            eventually(lambda: robot.zeros >= 3, lambda: program.text)
-            nothing_happens(1.5)
-            assert robot.zeros >= 3
-            moving = sum(speed > 0 for _, speed in robot.received)
-            assert moving <= 3, "what was sent before both stood still"
-        finally:
-            relay.resume()
-            program.signal(signal.SIGCONT)
-            program.close()
-            node.close()
+    with driving_over_a_stalled_link(screen, tmp_path) as (robot, relay, program):
+        program.signal(signal.SIGSTOP)
+        program.x11("mouseup", 1)
+        nothing_happens(1.0)
+        robot.received.clear()
+        steps = [relay.resume, lambda: program.signal(signal.SIGCONT)]
+        for step in steps if first == "link" else reversed(steps):
+            step()
+            nothing_happens(0.3)
+        eventually(lambda: robot.zeros >= 3, lambda: program.text)
+        nothing_happens(1.5)
+        assert robot.zeros >= 3
+        moving = sum(speed > 0 for _, speed in robot.received)
+        assert moving <= 3, "what was sent before both stood still"
 
 
 @pytest.mark.skipif(not QT6, reason="the wire, not Qt, is what matters")
