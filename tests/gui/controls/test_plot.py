@@ -52,10 +52,30 @@ def plot(controls: Any) -> Any:
     return lambda declaration: Shown(controls, declaration)
 
 
-def stamped(seconds: float, x: float, y: float = 0.0, after_ns: int = 0) -> dict[str, Any]:
-    whole, part = divmod(round(seconds * 1e6) * 1000 + after_ns, 1_000_000_000)
+#: Seconds of the first stamp.
+START = 1_700_000_000
+
+
+def stamped(seconds: float, x: float, y: float = 0.0) -> dict[str, Any]:
+    whole, part = divmod(round(seconds * 1e6) * 1000, 1_000_000_000)
     stamp = {"sec": whole, "nanosec": part}
     return {"header": {"stamp": stamp}, "point": {"x": x, "y": y}}
+
+
+@pytest.fixture
+def points(controls: Any, plot: Any, wait: Any) -> Any:
+    """Show a plot, and send it points on the topic /point: time in seconds, x, and perhaps y."""
+
+    def show(declaration: str, samples: list[tuple[float, ...]]) -> tuple[Shown, Any]:
+        publisher = controls.robot.create_publisher("/point", POINT)
+        shown = plot(declaration)
+        wait(publisher.subscription_count)
+        for sample in samples:
+            publisher.publish(**stamped(*sample))
+        wait(lambda: shown.get("received") == len(samples))
+        return shown, publisher
+
+    return show
 
 
 def rows(shown: Shown, wait: Any, tmp_path: Any) -> list[dict[str, str]]:
@@ -71,15 +91,11 @@ def rows(shown: Shown, wait: Any, tmp_path: Any) -> list[dict[str, str]]:
         return list(csv.DictReader(table))
 
 
-def test_every_sample_is_kept_with_its_stamp(
-    controls: Any, plot: Any, wait: Any, tmp_path: Any
-) -> None:
-    publisher = controls.robot.create_publisher("/point", POINT)
-    shown = plot('Plot { paths: ["/point:point.x", "/point:point.y"]; window: 10 }')
-    wait(publisher.subscription_count)
-    for number in range(3000):
-        publisher.publish(**stamped(1_700_000_000, number, -number, number * 1_000_000))
-    wait(lambda: shown.get("received") == 3000)
+def test_every_sample_is_kept_with_its_stamp(points: Any, wait: Any, tmp_path: Any) -> None:
+    shown, publisher = points(
+        'Plot { paths: ["/point:point.x", "/point:point.y"]; window: 10 }',
+        [(START + number / 1000, number, -number) for number in range(3000)],
+    )
     found = rows(shown, wait, tmp_path)
     assert len(found) == 6000
     assert found[2999] == {
@@ -90,16 +106,12 @@ def test_every_sample_is_kept_with_its_stamp(
     assert publisher.subscription_count() == 1
 
 
-def test_lines_are_drawn_at_their_values(controls: Any, plot: Any, wait: Any) -> None:
-    publisher = controls.robot.create_publisher("/point", POINT)
-    shown = plot(
+def test_lines_are_drawn_at_their_values(points: Any, wait: Any) -> None:
+    shown, _ = points(
         "Plot { window: 10; leftMin: 0; leftMax: 10; timeout: 0; paused: true\n"
-        'PlotSeries { path: "/point:point.x"; color: "#ff0000" } }'
+        'PlotSeries { path: "/point:point.x"; color: "#ff0000" } }',
+        [(START + number / 100, number / 100) for number in range(1001)],
     )
-    wait(publisher.subscription_count)
-    for number in range(1001):
-        publisher.publish(**stamped(1_700_000_000 + number / 100, number / 100))
-    wait(lambda: shown.get("received") == 1001)
     shown.data.toOldest()
     red = 0xFFFF0000
     wait(lambda: red in shown.color_at(0.55, 0.55))
@@ -107,17 +119,13 @@ def test_lines_are_drawn_at_their_values(controls: Any, plot: Any, wait: Any) ->
     assert red not in shown.color_at(0.25, 0.75)
 
 
-def test_plot_follows_theme_and_size_in_the_same_frame(controls: Any, plot: Any, wait: Any) -> None:
-    publisher = controls.robot.create_publisher("/point", POINT)
-    shown = plot(
+def test_plot_follows_theme_and_size_in_the_same_frame(points: Any, wait: Any) -> None:
+    shown, _ = points(
         "Plot { property string mode; onModeChanged: Theme.mode = mode\n"
         "property color panel: Theme.panel; window: 10; leftMin: 0; leftMax: 10; timeout: 0\n"
-        'paused: true; PlotSeries { path: "/point:point.x"; color: "#ff0000" } }'
+        'paused: true; PlotSeries { path: "/point:point.x"; color: "#ff0000" } }',
+        [(START + number / 100, number / 100) for number in range(1001)],
     )
-    wait(publisher.subscription_count)
-    for number in range(1001):
-        publisher.publish(**stamped(1_700_000_000 + number / 100, number / 100))
-    wait(lambda: shown.get("received") == 1001)
     shown.data.toOldest()
     red = 0xFFFF0000
     wait(lambda: red in shown.color_at(0.55, 0.55))
@@ -135,27 +143,16 @@ def test_plot_follows_theme_and_size_in_the_same_frame(controls: Any, plot: Any,
         shown.item.setProperty("mode", "dark")
 
 
-def test_silence_and_nan_are_gaps(controls: Any, plot: Any, wait: Any) -> None:
-    publisher = controls.robot.create_publisher("/point", POINT)
-    shown = plot(
+def test_silence_and_nan_are_gaps(points: Any, wait: Any) -> None:
+    times = [number / 100 for number in range(1001) if not 400 < number < 600]
+    shown, _ = points(
         "Plot { window: 10; leftMin: 0; leftMax: 2; paused: true; timeout: 0\n"
-        'PlotSeries { path: "/point:point.x"; color: "#ff0000" } }'
+        'PlotSeries { path: "/point:point.x"; color: "#ff0000" } }',
+        [(START + at, math.nan if 8 < at < 9 else 1.0) for at in times],
     )
-    wait(publisher.subscription_count)
-    for number in range(1001):
-        at = number / 100
-        if not 4 < at < 6:
-            value = math.nan if 8 < at < 9 else 1.0
-            publisher.publish(**stamped(1_700_000_000 + at, value))
-    wait(lambda: shown.get("received") == 1001 - 199)
     shown.data.toOldest()
     red = 0xFFFF0000
-    import time
-
-    t = time.time()
-    wait(lambda: red in shown.color_at(0.2, 0.5) or time.time() - t > 3)
-    controls.grab().save("/tmp/plot/gap.png")
-    print(shown.get("end"), shown.get("window"))
+    wait(lambda: red in shown.color_at(0.2, 0.5))
     assert red in shown.color_at(0.7, 0.5)
     assert red not in shown.color_at(0.5, 0.5)
     assert red not in shown.color_at(0.85, 0.5)
@@ -199,7 +196,7 @@ def test_path_that_cannot_be_plotted_is_named(
     publisher = controls.robot.create_publisher("/point", POINT)
     shown = plot(f"Plot {{ paths: {json.dumps([path, '/point:point.x'])} }}")
     wait(publisher.subscription_count)
-    publisher.publish(**stamped(1_700_000_000, 5.0))
+    publisher.publish(**stamped(START, 5.0))
     wait(lambda: problem in shown.get("problem"))
     # The other series lives on.
     wait(lambda: "5" in shown.readings())
@@ -256,16 +253,11 @@ def test_extreme_values_are_drawn(controls: Any, plot: Any, wait: Any, values: l
     assert shown.get("leftTicks")
 
 
-def test_time_that_goes_back_begins_a_new_run(
-    controls: Any, plot: Any, wait: Any, tmp_path: Any
-) -> None:
-    publisher = controls.robot.create_publisher("/point", POINT)
-    shown = plot('Plot { paths: ["/point:point.x"]; window: 10 }')
-    wait(publisher.subscription_count)
-    for start in (1000.0, 5.0):
-        for number in range(100):
-            publisher.publish(**stamped(start + number / 100, number))
-    wait(lambda: shown.get("received") == 200)
+def test_time_that_goes_back_begins_a_new_run(points: Any, wait: Any, tmp_path: Any) -> None:
+    shown, _ = points(
+        'Plot { paths: ["/point:point.x"]; window: 10 }',
+        [(start + number / 100, number) for start in (1000.0, 5.0) for number in range(100)],
+    )
     wait(lambda: 5 < shown.get("end") < 100)
     found = rows(shown, wait, tmp_path)
     assert [row["run"] for row in found] == ["0"] * 100 + ["1"] * 100
@@ -298,13 +290,11 @@ def test_plot_without_data_is_stale(controls: Any, plot: Any, wait: Any) -> None
     assert shown.item.property("status").startswith("OLD")
 
 
-def test_scrolling_pauses_and_stays_within_the_samples(controls: Any, plot: Any, wait: Any) -> None:
-    publisher = controls.robot.create_publisher("/point", POINT)
-    shown = plot('Plot { paths: ["/point:point.x"]; window: 2 }')
-    wait(publisher.subscription_count)
-    for number in range(1000):
-        publisher.publish(**stamped(1_700_000_000 + number / 100, number))
-    wait(lambda: shown.get("received") == 1000)
+def test_scrolling_pauses_and_stays_within_the_samples(points: Any, wait: Any) -> None:
+    shown, _ = points(
+        'Plot { paths: ["/point:point.x"]; window: 2 }',
+        [(START + number / 100, number) for number in range(1000)],
+    )
     wait(lambda: shown.get("end") > 1_700_000_009)
     shown.data.scroll(-3.0)
     assert shown.get("paused")
@@ -312,7 +302,7 @@ def test_scrolling_pauses_and_stays_within_the_samples(controls: Any, plot: Any,
     wait.nothing_happens(0.2)
     assert shown.get("end") == end
     shown.data.scroll(-1e30)
-    assert shown.get("end") >= 1_700_000_000
+    assert shown.get("end") >= START
     shown.data.zoomBy(2, 0.5)
     assert shown.get("window") == 1
     values = shown.data.valuesAt(1.0)["values"]
@@ -369,19 +359,13 @@ def test_file_that_cannot_be_written_is_named(
     assert "No such file" in results[0]
 
 
-def test_one_field_is_plotted_against_another(controls: Any, plot: Any, wait: Any) -> None:
-    publisher = controls.robot.create_publisher("/point", POINT)
-    shown = plot(
+def test_one_field_is_plotted_against_another(points: Any, wait: Any) -> None:
+    angles = [number / 200 * math.pi for number in range(400)]
+    shown, _ = points(
         "Plot { window: 100\n"
-        'PlotSeries { path: "/point:point.y"; xPath: "/point:point.x"; color: "#ff0000" } }'
+        'PlotSeries { path: "/point:point.y"; xPath: "/point:point.x"; color: "#ff0000" } }',
+        [(START + angle, 10 * math.cos(angle), 10 * math.sin(angle)) for angle in angles],
     )
-    wait(publisher.subscription_count)
-    for number in range(400):
-        angle = number / 400 * 2 * math.pi
-        publisher.publish(
-            **stamped(1_700_000_000 + number / 100, 10 * math.cos(angle), 10 * math.sin(angle))
-        )
-    wait(lambda: shown.get("received") == 400)
     assert shown.get("isXY")
     wait(lambda: "-10" in [tick["text"] for tick in shown.get("bottomTicks")])
     # A circle: its centre and its corners are empty.
@@ -397,7 +381,7 @@ def test_added_paths_keep_the_samples_of_the_others(
     publisher = controls.robot.create_publisher("/point", POINT)
     shown = plot('Plot { paths: ["/point:point.x"] }')
     wait(publisher.subscription_count)
-    publisher.publish(**stamped(1_700_000_000, 1.0, 2.0))
+    publisher.publish(**stamped(START, 1.0, 2.0))
     wait(lambda: shown.get("received") == 1)
     shown.data.setProperty("paths", ["/point:point.x", "/point:point.y"])
     wait(lambda: len(shown.get("legend")) == 2)
