@@ -40,6 +40,15 @@ _QUIET_MS, _MAX_WAIT_MS = 400, 3000
 _COLLECT_MS = 300
 #: Errors kept of a running plugin.
 _MAX_COMPLAINTS = 20
+_CONTROLS = QtCore.QByteArray(b"import QtQml\nimport QtQuick.Controls\nQtObject {}")
+#: The arrays of qml6_ros2_plugin have `at` also when a ListModel has copied them; Qt's have not.
+_ARRAY_AT = """if (typeof [].at !== "function")
+    Object.defineProperty(Array.prototype, "at", {
+        value: function (index) { return this[index < 0 ? this.length + index : index] },
+        enumerable: false
+    })"""
+#: A name that RQml's Joint Trajectory Controller uses; numbers as in `ActionGoalStatus`.
+_RESULT_CODES = {"UNKNOWN": 0, "SUCCEEDED": 4, "CANCELED": 5, "ABORTED": 6}
 _MISSING = re.compile(r'module "([\w.]+)" (?:plugin|is not installed|version)')
 _QT5 = (
     "plugins of RQml need Qt 6 (PySide6), and this program runs Qt 5: show the layout with "
@@ -218,7 +227,7 @@ class PluginLoader(QtQuick.QQuickItem):
         except Error as error:
             self._fail(str(error))
             return
-        _add_modules(engine)
+        _prepare(engine)
         api = RqmlApi.of(engine)
         if outer is not None and outer.baseUrl().isLocalFile():
             api.allow(Path(outer.baseUrl().toLocalFile()).parent, writable=True)
@@ -234,6 +243,7 @@ class PluginLoader(QtQuick.QQuickItem):
         context.setContextProperty("context", self._map.map)
         context.setContextProperty("uniqueName", self.name or f"{file.stem}_{next(_numbers)}")
         context.setContextProperty("RQml", api)
+        context.setContextProperty("ActionResultCode", _RESULT_CODES)
         self._make_look(engine, file)
         component = self._component = QtQml.QQmlComponent(
             engine, QtCore.QUrl.fromLocalFile(str(file)), self
@@ -414,7 +424,9 @@ class PluginLoader(QtQuick.QQuickItem):
         item, mine = warning.object(), self._context
         context = context_of(item) if item is not None and is_alive(item) else None
         if context is None:
-            return bool(place == self.file)
+            # Only the plugins of a folder use what is in its subfolders, but any of them may.
+            inside = place.startswith(self._folder) and os.sep in place[len(self._folder) :]
+            return bool(place == self.file or inside)
         while context is not None and mine is not None and context.isValid():
             if context == mine:
                 return True
@@ -450,11 +462,20 @@ class PluginLoader(QtQuick.QQuickItem):
         return "Plugin"
 
 
-def _add_modules(engine: QtQml.QQmlEngine) -> None:
-    """Let an engine find our modules of RQml, after RQml's own."""
+def _prepare(engine: QtQml.QQmlEngine) -> None:
+    """Prepare an engine for plugins; only the first call has an effect."""
     paths, ours = list(engine.importPathList()), str(_MODULES)
-    if ours not in paths:
-        engine.setImportPathList([*paths, ours])
+    if ours in paths:
+        return
+    engine.setImportPathList([*paths, ours])
+    # The style that is imported first becomes that of all controls in the program.
+    first = QtQml.QQmlComponent(engine)
+    first.setData(_CONTROLS, QtCore.QUrl())
+    made = first.create()
+    for item in (made, first):
+        if item is not None:
+            item.deleteLater()
+    engine.evaluate(_ARRAY_AT)
 
 
 def _explained(errors: str) -> str:

@@ -495,6 +495,26 @@ def test_plugins_in_material_style_have_the_themes_colours(bench: PluginBench) -
 
 
 @only_qt6
+def test_a_plugin_in_material_style_leaves_the_style_of_others(bench: PluginBench) -> None:
+    other = (
+        f"property Item second: Plugin {{ {source('Elements.qml')} }}\n Item {{ children: second }}"
+    )
+    bench.show(source("Material.qml"), other)
+    second = bench.root.property("second")
+    bench.wait(lambda: second.property("status") == "ready")
+    from rosglass.qt import optional
+
+    assert optional("QtQuickControls2").QQuickStyle.name() == "Fusion"
+
+
+@only_qt6
+def test_arrays_of_messages_in_models_have_at(bench: PluginBench) -> None:
+    bench.show(source("Arrays.qml"))
+    assert bench.plugin.property("complaint") == ""
+    assert bench.value("last") == "elbow4"
+
+
+@only_qt6
 def test_depths_are_shown_as_greys(bench: PluginBench) -> None:
     from rosglass.qt import optional
 

@@ -60,6 +60,10 @@ TreeView {
             visible: !cell.isTreeNode
             anchors { fill: parent; rightMargin: 8 }
 
+            Label {
+                visible: !cell.isTreeNode && cell.type_ === "array" && !cell.hasChildren
+                text: "[]"
+            }
             Loader {
                 Layout.fillWidth: true
                 active: !cell.isTreeNode && cell.isLeaf_

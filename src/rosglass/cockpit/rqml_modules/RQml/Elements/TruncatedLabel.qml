@@ -6,6 +6,8 @@ Label {
     id: label
 
     elide: Text.ElideRight
+    // A text of several lines is not cut by the ellipsis.
+    clip: contentWidth > width
     textFormat: Text.PlainText
 
     HoverHandler { id: pointer }
