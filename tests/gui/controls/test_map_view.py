@@ -11,6 +11,7 @@ from hands import click
 from map_messages import grid, transform
 
 from rosglass.comm import QoS
+from rosglass.controls.maps.tiles import TileKey
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -96,14 +97,16 @@ def test_updates_change_only_their_tiles(
     wait(updates.subscription_count)
     wait(lambda: is_complete(view))
     tiles = layer(view, "map").grid.tiles
-    before = [versions.copy() for versions in tiles._versions]
+    keys = [TileKey(0, column, row) for column in range(3) for row in range(3)]
+    before = {key: tiles.version(key) for key in keys}
     data = np.full((3, 2), 100, np.int8)
     updates.publish(header={"frame_id": "map"}, x=1000, y=700, width=2, height=3, data=data.ravel())
     wait(lambda: tiles.value_at(100.05, 70.05) == 100)
-    changed = np.argwhere(tiles._versions[0] != before[0]).tolist()
-    assert changed == [[1, 1]]
+    assert [key for key in keys if tiles.version(key) != before[key]] == [TileKey(0, 1, 1)]
     # A wall of one cell is seen from far.
-    assert tiles._cells[-1].max() == 101
+    far = tiles.paint(TileKey(tiles.levels - 1, 0, 0))
+    shown = {far.pixel(x, y) for x in range(far.width()) for y in range(far.height())}
+    assert int(tiles.colors[101]) in shown
     wait(lambda: is_complete(view))
     updates.publish(header={"frame_id": "map"}, x=1099, y=0, width=2, height=3, data=data.ravel())
     wait(lambda: "beyond the map of 1100 x 1100 cells" in view.property("status"))

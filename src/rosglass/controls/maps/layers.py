@@ -506,7 +506,7 @@ class VectorLayer(MapLayer):
 
     @property
     def shape(self) -> Shape | None:
-        """The map that is shown; None for nothing."""
+        """The drawing that is shown; None for nothing."""
         return self._shape
 
     @property

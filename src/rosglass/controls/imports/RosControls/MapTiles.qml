@@ -1,4 +1,4 @@
-// The tiles of one tiled of a map; a part of the maps.
+// The tiles of one layer of a map; a part of the maps.
 import QtQuick 2.15
 
 Item {
