@@ -111,7 +111,7 @@ FocusScope {
             readonly property bool isSet: model.isSet
             readonly property string fallback: model.fallback
             readonly property bool locked: model.isBound && !model.isReplacing
-            readonly property string range: isFinite(model.low) && isFinite(model.high) ? qsTr("%1 to %2").arg(model.low).arg(model.high)
+            readonly property string range: isFinite(model.low) && isFinite(model.high) ? model.low + " … " + model.high
                 : isFinite(model.low) ? qsTr("from %1 on").arg(model.low) : ""
             readonly property bool narrow: width < 300 * Theme.size
 
@@ -125,7 +125,7 @@ FocusScope {
                 id: label
                 anchors { left: parent.left; top: parent.top; right: row.narrow ? resetButton.left : editor.left; rightMargin: Theme.gap }
                 height: row.narrow ? Theme.normal * 1.6 : Theme.touch
-                text: row.unit ? qsTr("%1 (%2)").arg(row.name).arg(row.unit) : row.name
+                text: row.unit ? row.name + " (" + row.unit + ")" : row.name
                 color: row.isSet ? Theme.text : Theme.dim
                 font.weight: row.isSet ? Font.DemiBold : Font.Normal
                 verticalAlignment: Text.AlignVCenter
@@ -176,7 +176,7 @@ FocusScope {
                         text: qsTr("bound: %1").arg(model.expression)
                         color: Theme.warn
                         Accessible.role: Accessible.StaticText
-                        Accessible.name: qsTr("%1, %2").arg(row.name).arg(text)
+                        Accessible.name: row.name + ", " + text
                     }
                     ThemeButton {
                         id: replace

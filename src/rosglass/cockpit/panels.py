@@ -59,7 +59,7 @@ _GROUP_OF = {
         "Plot": "Plot Gauge",
         "State": "Battery JointView Lamp",
         "Lists": "AlarmList DiagnosticsView LogView TopicTree MessageView NodeGraph TfTree",
-        "Call": "ServiceButton ActionPanel ParameterForm PublishPanel CallPanel GoalPanel",
+        "Call": "ServiceButton ActionPanel ParameterForm PublishPanel CallPanel",
         "Record": "Recorder Timeline",
         "Robots": "RobotSwitch",
     }.items()
@@ -179,12 +179,7 @@ def controls() -> tuple[Panel, ...]:
     for folder in (_CONTROLS, _ROS2_TYPES):
         known.update(described_types((folder / "plugins.qmltypes").read_text(encoding="utf-8")))
     frame = [one for one in properties_of(texts["LiveFrame"]) if one.name in _FRAME_PROPERTIES]
-    found = [
-        _control(name, texts[name], known, frame)
-        for name in _GROUP_OF
-        # Until all of them are written.
-        if name in texts
-    ]
+    found = [_control(name, texts[name], known, frame) for name in _GROUP_OF]
     found.append(_scene_view())
     order = {group: at for at, group in enumerate(GROUPS)}
     return tuple(sorted(found, key=lambda panel: (order[panel.group], panel.name)))

@@ -10,6 +10,7 @@ from rosglass.controls.lists.diagnostics import DiagnosticsTopic
 from rosglass.controls.lists.graph_layout import GraphLayout
 from rosglass.controls.lists.joints import JointTopic
 from rosglass.controls.lists.log_topic import LogTopic
+from rosglass.controls.lists.message_fields import MessageFields
 from rosglass.controls.lists.message_rows import MessageRows
 from rosglass.controls.lists.node_parameters import NodeParameters
 from rosglass.controls.lists.tf_rows import TfRows
@@ -53,6 +54,7 @@ TYPES: dict[str, type[QtCore.QObject]] = {
     "MapMarks": MapMarks,
     "MapScene": MapScene,
     "WindowKeys": WindowKeys,
+    "MessageFields": MessageFields,
     "MessageRows": MessageRows,
     "TfRows": TfRows,
     "TopicRows": TopicRows,

@@ -89,7 +89,7 @@ def test_properties_are_shown_with_their_defaults_and_meanings(form: Form) -> No
     assert (empty["text"], empty["isSet"], empty["low"], empty["high"]) == ("0.15", False, 0, 1)
     assert form.model.property("title") == "Battery"
     form.wait(lambda: form.find("detail", "property_low").property("text").endswith("default: 0.3"))
-    assert "0 to 1" in form.find("detail", "property_low").property("text")
+    assert "0 … 1" in form.find("detail", "property_low").property("text")
 
 
 @pytest.mark.parametrize(

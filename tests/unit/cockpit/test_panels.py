@@ -35,7 +35,7 @@ def test_every_control_is_a_panel_or_a_part() -> None:
 def test_panel_is_described(panel: Any) -> None:
     assert panel.group in panels.GROUPS
     assert panel.line.endswith((".", ":"))
-    assert panel.snippet.startswith(f"{panel.name} {{")
+    assert re.match(rf"(Scene\.)?{panel.name} {{", panel.snippet)
     assert (Path("docs") / panel.page.replace(".html", ".md")).is_file()
     for one in panel.properties:
         assert one.kind in KINDS
