@@ -38,11 +38,14 @@ __all__ = [
 
 #: Objects on one line are broken into several lines beyond this.
 _MOST_COLUMNS = 100
-_NEWLINE = re.compile(r"\r\n|\n|\r")
+_NEWLINE = re.compile(r"\r\n|[\n\r\u2028\u2029]")
+_LINE_ENDS = "\n\r\u2028\u2029"
+#: Those that editors write; QML knows two more.
+_USUAL_NEWLINE = re.compile(r"\r\n|\n|\r")
 _BLANKS = re.compile(r"[^\S\r\n\u2028\u2029]*")
 _COMMENT = re.compile(r"//[^\r\n\u2028\u2029]*|/\*(?s:.*?)\*/")
 #: A comment behind an object, up to the end of the line.
-_OPEN_END = re.compile(r"\}[^}]*//[^\r\n]*$")
+_OPEN_END = re.compile(r"\}[^}]*//[^\r\n\u2028\u2029]*$")
 _SPACE = re.compile(r"\s*")
 _ID = re.compile(r"[a-z_][A-Za-z0-9_]*")
 _PROPERTY = re.compile(r"(?!\d)[$\w]+(?:\.(?!\d)[$\w]+)*")
@@ -75,7 +78,7 @@ class Document:
         self._scan = Scanner(text, file, is_part)
         self.text, self.file = text, file
         self.root, self.imports = self._scan.root, self._scan.imports
-        found = _NEWLINE.search(text)
+        found = _USUAL_NEWLINE.search(text)
         self._newline = found[0] if found else "\n"
         self._unit = self._indent_unit()
 
@@ -399,7 +402,7 @@ class Document:
         indent = self._indent(target.span.start)
         between = self._newline + indent
         text = between.join(self._indented(block, indent) for block in blocks)
-        if self._is_open_ended(blocks[-1]) and not self._rest_of_line(target.span.end)[2]:
+        if self._is_open_ended(text) and not self._ends_line(self._blanks(target.span.end)):
             text += between
         return self._splice([(*target.span, text)])
 
@@ -508,7 +511,7 @@ class Document:
         return text, closed
 
     def _with_newlines(self, text: str) -> str:
-        return _NEWLINE.sub(lambda _: self._newline, text)
+        return _USUAL_NEWLINE.sub(lambda _: self._newline, text)
 
     def _object_text(self, text: str) -> str:
         """Return a new object without indentation, checked."""
@@ -547,7 +550,7 @@ class Document:
     # Lines
 
     def _line_start(self, at: int) -> int:
-        return max(self.text.rfind("\n", 0, at), self.text.rfind("\r", 0, at)) + 1
+        return max(self.text.rfind(end, 0, at) for end in _LINE_ENDS) + 1
 
     def _blanks(self, at: int) -> int:
         """Return the offset behind blanks on the line."""
@@ -567,7 +570,7 @@ class Document:
         return self._blanks(self._line_start(at)) >= at
 
     def _ends_line(self, at: int) -> bool:
-        return at == len(self.text) or self.text[at] in "\r\n"
+        return at == len(self.text) or self.text[at] in _LINE_ENDS
 
     def _rest_of_line(self, at: int) -> tuple[int, int, bool]:
         """Return the end of the comments behind an offset, what follows, and if the line ends.

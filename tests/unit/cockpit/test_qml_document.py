@@ -298,6 +298,10 @@ class TestObjects:
         assert split is not None
         assert [child.type for child in split.children] == ["Panel", "Panel"]
         assert split.children[0].text == named(layout, "Front").text
+        inner = Document("Item {\n    W {\n        A {} // a\n    } /* w\n    */\n}\n")
+        assert inner.unwrap(inner.root.children[0]).text == (
+            "Item {\n    A {} // a\n     /* w\n    */\n}\n"
+        )
         with pytest.raises(ArgumentError, match="with children"):
             layout.unwrap(named(layout, "Map").children[0])
 
