@@ -438,3 +438,15 @@ def test_buttons_of_a_small_map_are_behind_one(controls: Any, wait: Any) -> None
     view.setProperty("width", 400)
     wait(controls.find("goal").isVisible)
     assert not bar.isVisible()
+
+
+def test_map_of_a_robot_that_is_followed_is_fitted_once(
+    robot: Robot, controls: Any, wait: Any
+) -> None:
+    robot.start()
+    view = controls.show("MapView { width: 380; height: 280; follow: true }")
+    camera = view.property("camera")
+    # The map has 6 m x 4 m.
+    wait(lambda: 4 <= camera.property("span") < 6)
+    wait(lambda: view.property("scene").property("robotSeen"))
+    assert camera.property("centerX") == pytest.approx(view.property("scene").property("robotX"))

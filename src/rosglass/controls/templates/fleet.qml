@@ -65,11 +65,12 @@ Window {
                     topic: "emergency_stop"
                 }
                 Speed {
-                    Layout.fillWidth: true
+                    Layout.preferredWidth: 200 * Theme.size
                     visible: window.width >= 1000 * Theme.size
                     ns: robots.current
                     command: drive
                 }
+                Item { Layout.fillWidth: true }
                 DriveKeys { command: drive }
                 DriveStick { command: drive }
             }

@@ -32,8 +32,9 @@ Item {
 
     property bool steers_: false
 
-    implicitWidth: keycaps ? 3 * Theme.touch + 2 * caps.spacing : 0
-    implicitHeight: keycaps ? 2 * Theme.touch + caps.spacing : 0
+    // Not 0, for which layouts keep the size that it had.
+    implicitWidth: keycaps ? 3 * Theme.touch + 2 * caps.spacing : 1
+    implicitHeight: keycaps ? 2 * Theme.touch + caps.spacing : 1
     Accessible.role: Accessible.StaticText
     Accessible.name: qsTr("Keys that drive the robot")
     Accessible.description: held && !active && command ? command.problem : ""

@@ -96,10 +96,23 @@ LiveFrame {
         follow = false
         fitted_ = true
     }
-    function fitOnce_() {
-        if (fitted_ || follow || !(plane.width > 0 && plane.height > 0))
+    // The first view of a robot that is followed: as large as the map, but not from too far.
+    function fitAround_() {
+        const box = scene_.bounds(), most = 30
+        if (!(box.width > 0))
             return
-        if (scene_.hasMap)
+        fitted_ = true
+        camera_.fit(box.x, box.y, box.x + box.width, box.y + box.height)
+        if (camera_.span > most)
+            camera_.zoomBy(camera_.span / most, plane.width / 2, plane.height / 2)
+        lookAtRobot_()
+    }
+    function fitOnce_() {
+        if (fitted_ || !(plane.width > 0 && plane.height > 0))
+            return
+        if (scene_.hasMap && follow)
+            fitAround_()
+        else if (scene_.hasMap)
             fit()
         else if (scene_.robotSeen)
             camera_.lookAt(scene_.robotX, scene_.robotY)
