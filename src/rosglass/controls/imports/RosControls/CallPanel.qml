@@ -53,7 +53,7 @@ LiveFrame {
     }
     function lines_(value) {
         const found = []
-        const left = Fields.walk(value, (path, one) => found.push(Fields.fill(qsTr("%1: %2"), path, Fields.shown(one))), 60)
+        const left = Fields.walk(value, (path, one) => found.push(Fields.fill(qsTr("%1: %2"), [path, Fields.shown(one)])), 60)
         return found.concat(left > 0 ? [qsTr("and %1 more fields").arg(left)] : []).join("\n")
     }
 

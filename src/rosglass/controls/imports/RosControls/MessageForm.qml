@@ -223,7 +223,7 @@ FocusScope {
             width: rows.width
             height: Math.round(Theme.touch * (entered || kind === "bool" ? 1 : 0.8)) + (detail.visible ? detail.implicitHeight + 3 : 3)
             Accessible.role: Accessible.Grouping
-            Accessible.name: model.unit ? Fields.fill(qsTr("%1 in %2"), key, model.unit) : key
+            Accessible.name: model.unit ? Fields.fill(qsTr("%1 in %2"), [key, model.unit]) : key
 
             ThemeButton {
                 id: fold
@@ -244,8 +244,8 @@ FocusScope {
                 anchors { left: fold.right; leftMargin: Theme.gap / 2 }
                 width: Math.max(0, (line.entered || line.kind === "bool" ? rows.width * 0.42 : rows.width - buttons.width - Theme.gap) - x)
                 height: Math.round(Theme.touch * (line.entered || line.kind === "bool" ? 1 : 0.8))
-                text: line.entered || line.kind === "bool" ? (model.unit ? Fields.fill(qsTr("%1 (%2)"), model.name, model.unit) : model.name)
-                    : Fields.fill(qsTr("%1  %2"), model.name, line.kind === "array" ? model.type + ": " + line.text : line.kind === "message" ? model.type : line.kind === "long" ? qsTr("a long text, which is kept") : "")
+                text: line.entered || line.kind === "bool" ? (model.unit ? Fields.fill(qsTr("%1 (%2)"), [model.name, model.unit]) : model.name)
+                    : Fields.fill(qsTr("%1  %2"), [model.name, line.kind === "array" ? model.type + ": " + line.text : line.kind === "message" ? model.type : line.kind === "long" ? qsTr("a long text, which is kept") : ""])
                 color: line.problem ? Theme.bad : line.kind === "message" || line.kind === "array" ? Theme.text : Theme.dim
                 verticalAlignment: Text.AlignVCenter
             }

@@ -122,7 +122,7 @@ LiveFrame {
     stale: false
     age: 0
     problem: obstacle || (publisher_ && publisher_.problem ? Fields.bounded(publisher_.problem, 120) : "")
-    note: repeating ? Fields.fill(qsTr("PUBLISHING %1 Hz · %2"), rate_, sent) : sent > 0 ? qsTr("%1 sent").arg(sent) : ""
+    note: repeating ? Fields.fill(qsTr("PUBLISHING %1 Hz · %2"), [rate_, sent]) : sent > 0 ? qsTr("%1 sent").arg(sent) : ""
     contentWidth: 340 * Theme.size
     contentHeight: 320 * Theme.size
 
