@@ -73,6 +73,8 @@ LiveFrame {
     note: confirmed === undefined ? "" : text_(confirmed)
     contentWidth: 240 * Theme.size
     contentHeight: column.height
+    // A reason in the middle would cover the buttons.
+    filled: true
     Accessible.description: status || qsTr("confirmed: %1").arg(note) + (outcome.text ? "; " + outcome.text : "")
 
     function text_(value) {

@@ -49,6 +49,8 @@ LiveFrame {
     note: total ? (parameters.count < total ? Fields.fill(qsTr("%1 of %2"), [parameters.count, total]) : String(total)) : ""
     contentWidth: 380 * Theme.size
     contentHeight: 300 * Theme.size
+    // A reason in the middle would cover the choice of another node.
+    filled: true
 
     NodeParameters {
         id: parameters
