@@ -24,6 +24,7 @@ from rosglass.cockpit.property_form import PropertyModel
 from rosglass.cockpit.qml_document import Code, Document, to_qml
 from rosglass.cockpit.robots import FoundRobot, RobotSearch, addresses
 from rosglass.cockpit.rqml import RqmlPlugin, find_plugins
+from rosglass.cockpit.trust import TrustedLayouts, senders
 from rosglass.errors import Error
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qml.engine.runtime import runtime_of
@@ -49,6 +50,8 @@ _MESSAGE_S, _LOOK_S = 10.0, 1.0
 _FOLLOWED = "rosglass_followed"
 #: Files opened lately that are remembered.
 _MAX_RECENT = 8
+#: Senders that a question lists.
+_MAX_SENDERS = 8
 #: Address of the robot of the tour, and the port of its router.
 _TOUR_URL = "zenoh://127.0.0.1:7457"
 
@@ -163,6 +166,7 @@ class CockpitProgram(QtCore.QObject):
         self._wanted = ""
         self._properties: PropertyModel | None = None
         self._state = state_folder()
+        self._trusted = TrustedLayouts()
         self._found.connect(self._on_found)
         self._timer = QtCore.QTimer(self)
         self._timer.setInterval(round(_LOOK_S * 1000))
@@ -400,6 +404,43 @@ class CockpitProgram(QtCore.QObject):
             report(self, problem=str(error))
             self.say(str(error))
             return
+        found = [] if self._trusted.knows(path, file.text) else senders(document)
+        if not found:
+            self._accept(file, document)
+            return
+        more = self.tr(" and {} more").format(len(found) - _MAX_SENDERS)
+        shown = ", ".join(found[:_MAX_SENDERS]) + (more if len(found) > _MAX_SENDERS else "")
+        self._ask(
+            self.tr(
+                "{} was not opened here before. It can send to the robot: {}. Open it only if you "
+                "know where it comes from."
+            ).format(path, shown),
+            [
+                self.tr("Open, and trust this folder"),
+                self.tr("Open once"),
+                self.tr("Do not open"),
+            ],
+            lambda index: self._decide_on(index, file, document),
+        )
+
+    def _decide_on(self, index: int, file: LayoutFile, document: Document) -> None:
+        if index == 2:
+            return
+        if index == 0:
+            self._try(lambda: self._trusted.trust_folder(file.path.parent))
+        self._accept(file, document)
+
+    def _try(self, job: Callable[[], object]) -> bool:
+        """Call a function, and say its error; return whether there was none."""
+        try:
+            job()
+        except Error as error:
+            self.say(str(error))
+            return False
+        return True
+
+    def _accept(self, file: LayoutFile, document: Document) -> None:
+        path = file.path
         self._file = file
         self._show_layout(document, path.name)
         self._remember(path)
@@ -771,7 +812,9 @@ class CockpitProgram(QtCore.QObject):
             return False
         self._history.mark_saved()
         Recovery.drop(self._file.path)
-        self._remember(self._file.path)
+        saved = self._file.path
+        self._try(lambda: self._trusted.trust(saved, text))
+        self._remember(saved)
         report(self, path=str(self._file.path), name=self._file.path.name)
         self.say(self.tr("saved to {}").format(self._file.path))
         self._refresh()

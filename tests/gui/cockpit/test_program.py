@@ -90,6 +90,23 @@ class Editor:
         left, none = QtCore.Qt.MouseButton.LeftButton, QtCore.Qt.KeyboardModifier.NoModifier
         optional("QtTest").QTest.mouseClick(self.window, left, none, at)
 
+    def answer(self, index: int) -> None:
+        """Click on an answer of the question, once it can be clicked."""
+        from rosglass.qt import QtCore
+
+        box = self.window.findChild(QtCore.QObject, "question")
+        self.wait(lambda: box.property("opened"))
+        item = self.find(f"answer{index}")
+        place: list[float] = []
+
+        def stands() -> bool:
+            place.append(item.mapToScene(QtCore.QPointF(0, 0)).x())
+            return len(place) > 3 and place[-1] == place[-3]
+
+        self.wait(stands)
+        self.click(f"answer{index}")
+        assert self.program.property("question") == ""
+
     def key(self, text: str) -> None:
         from rosglass.qt import QtGui, optional
 
@@ -209,7 +226,7 @@ def test_change_of_another_program_is_merged(edit: Callable[..., Editor], file: 
     assert "Energy" in editor.text
     file.write_text(LAYOUT.replace('"Power"', '"Volts"'))
     editor.wait(lambda: editor.program.property("question") != "")
-    editor.click("answer1")
+    editor.answer(1)
     assert "Energy" in editor.text
 
 
@@ -220,7 +237,7 @@ def test_changes_survive_a_crash(edit: Callable[..., Editor], file: Path) -> Non
     editor.program.rename("Energy")
     again = edit(file)
     again.wait(lambda: again.program.property("question") != "")
-    again.click("answer0")
+    again.answer(0)
     again.wait(lambda: "Energy" in again.text)
 
 
@@ -233,3 +250,21 @@ def test_help_of_a_panel_opens_its_page(edit: Callable[..., Editor], file: Path)
     editor.find("helpPage")
     editor.key("Esc")
     editor.wait(lambda: editor.program.property("helpText") == "")
+
+
+def test_layout_of_a_stranger_is_opened_once_it_is_agreed_to(
+    edit: Callable[..., Editor], file: Path
+) -> None:
+    file.write_text(LAYOUT.replace("Attitude {}", "DriveStick {}"))
+    editor = edit(file)
+    editor.wait(lambda: editor.program.property("question") != "")
+    assert "DriveStick (line 19)" in editor.program.property("question")
+    assert not editor.program.property("hasLayout")
+    editor.answer(2)
+    assert not editor.program.property("hasLayout")
+    editor.program.open(str(file))
+    editor.answer(0)
+    editor.wait(lambda: editor.program.property("opened"))
+    again = edit(file)
+    again.wait(lambda: again.program.property("opened"))
+    assert again.program.property("question") == ""
