@@ -296,3 +296,34 @@ def test_detached_panels_come_back_when_edit_mode_begins(layouts: Any, hand: Han
     assert layouts.find("a").property("detached")
     layouts.root.setProperty("editing", True)
     assert not layouts.find("a").property("detached")
+
+
+def test_a_window_that_the_hand_has_moved_is_reported(layouts: Any) -> None:
+    import time
+
+    from rosglass.qt import QtGui
+
+    layouts.show(
+        WISHES
+        + 'onWindowMoved: (one, screen, x, y, w, h) => note("window", x, y, w, h)\n'
+        + f"Page {{ {panel('a')} }}"
+        + 'PanelWindow { title: "W"; x: 10; y: 20; width: 300; height: 200; '
+        + panel("b")
+        + "}"
+    )
+    window = next(one for one in QtGui.QGuiApplication.topLevelWindows() if one.title() == "W")
+    layouts.wait(window.isExposed)
+    moved_at = 0.0
+
+    def is_reported() -> bool:
+        # What happens in its first second is the window manager's.
+        nonlocal moved_at
+        if time.monotonic() > moved_at + 0.7:
+            moved_at = time.monotonic()
+            window.requestActivate()
+            if window.isActive():
+                window.setPosition(window.x() + 5, window.y() + 7)
+        return bool(wishes(layouts))
+
+    layouts.wait(is_reported)
+    assert wishes(layouts)[-1] == ["window", window.x(), window.y(), 300, 200]

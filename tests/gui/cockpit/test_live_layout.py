@@ -76,7 +76,7 @@ class Stage:
 
         (folder / "Mark.qml").write_text(MARK)
         self.file = folder / "layout.qml"
-        self.wait, self.robot = wait, running.robot
+        self.wait, self.robot, self.session = wait, running.robot, running.session
         self.window = QtQuick.QQuickWindow()
         self.window.resize(800, 600)
         self.window.show()
@@ -226,6 +226,79 @@ def test_any_changes_give_the_same_screen_as_loading(stage: Stage, running: Any)
                 stage.wait.settled(running.session)
                 assert stage.boxes() == followed, stage.document.text
                 assert len(stage.loads) == loads + 1
+
+
+def test_commands_halt_when_a_change_moves_panels(stage: Stage) -> None:
+    from rosglass.qt import QtCore, optional
+
+    received: list[float] = []
+    subscription = stage.robot.create_subscription(
+        "/cmd_vel", "geometry_msgs/msg/Twist", lambda message: received.append(message.linear.x)
+    )
+    text = LAYOUT.replace('Mark { name: "a" }', 'DriveStick { objectName: "stick" }')
+    assert stage.show(text)
+    stick = stage.find("stick")
+    test: Any = optional("QtTest").QTest
+    left, none = QtCore.Qt.MouseButton.LeftButton, QtCore.Qt.KeyboardModifier.NoModifier
+    up = stick.mapToScene(QtCore.QPointF(stick.width() / 2, stick.height() / 2 - 60)).toPoint()
+
+    def is_driving() -> bool:
+        stage.window.requestActivate()
+        if not stick.property("active"):
+            test.mouseRelease(stage.window, left, none, up)
+            test.mousePress(stage.window, left, none, up)
+        return bool(stick.property("active") and received and received[-1] > 0)
+
+    stage.wait(is_driving)
+    # A title alone changes nothing for the hand.
+    assert stage.show(text.replace('title: "B"', 'title: "Z"'))
+    assert stick.property("command").property("active")
+    stage.wait(is_driving)
+    edits = LayoutEdits(stage.document)
+    edits.move(stage.panel("C"), stage.panel("D"), "right")
+    assert stage.live.show(edits.document)
+    assert not stick.property("command").property("active")
+    stage.wait(lambda: received[-1] == 0)
+    subscription.close()
+
+
+def test_any_changes_leave_no_warnings(stage: Stage, caplog: Any, messages: None) -> None:
+    """Moves, windows, new and removed panels and pages, undone in any order."""
+    import random
+
+    from rosglass.cockpit.layout_edits import EDGES, element_of
+    from rosglass.errors import ArgumentError
+    from rosglass.qt import send_deferred_deletes
+
+    rng, texts = random.Random(11), [LAYOUT]
+    for _ in range(80):
+        document = stage.document
+        found = [one for one in document.objects() if element_of(one) not in {"", "Cockpit"}]
+        panels = [one for one in found if element_of(one) == "Panel"]
+        pages = [one for one in found if element_of(one) == "Page"]
+        edits, choice = LayoutEdits(document), rng.random()
+        try:
+            if choice < 0.15 and len(panels) > 2:
+                edits.remove(rng.choice(panels))
+            elif choice < 0.25:
+                edits.to_window(rng.choice(panels), "", 0, 0, 300, 200)
+            elif choice < 0.4:
+                edits.add('Panel { Mark { name: "new" } }', rng.choice(found))
+            elif choice < 0.5 and len(pages) > 1:
+                edits.move_page(rng.choice(pages), 0)
+            elif choice < 0.6:
+                assert stage.show(rng.choice(texts))
+                continue
+            else:
+                edits.move(rng.choice(panels), rng.choice(found), rng.choice(EDGES))
+        except ArgumentError:
+            continue
+        assert stage.live.show(edits.document), stage.live.problem
+        texts.append(edits.document.text)
+        stage.wait.settled(stage.session)
+        send_deferred_deletes()
+    assert len(stage.loads) == 1
+    assert [one.getMessage() for one in caplog.records if one.levelname != "INFO"] == []
 
 
 def test_a_changed_literal_is_set(stage: Stage) -> None:

@@ -39,6 +39,10 @@ Item {
     implicitHeight: 600 * Theme.size
     visible: false
 
+    function arrange() {
+        body.arrange()
+    }
+
     onProblemChanged: if (problem) console.warn("PanelWindow " + title + ": " + problem)
 
     Window {
@@ -52,12 +56,36 @@ Item {
         width: panelWindow.screen_ ? Math.min(panelWindow.fullScreen ? panelWindow.screen_.width : panelWindow.width, panelWindow.screen_.width) : panelWindow.width
         height: panelWindow.screen_ ? Math.min(panelWindow.fullScreen ? panelWindow.screen_.height : panelWindow.height, panelWindow.screen_.height) : panelWindow.height
         visibility: !panelWindow.open ? Window.Hidden : panelWindow.fullScreen ? Window.FullScreen : Window.Windowed
+        // Where the hand has put it, in edit mode: once it lies still, and not where a window manager puts a new one.
+        onXChanged: moved_()
+        onYChanged: moved_()
+        onWidthChanged: moved_()
+        onHeightChanged: moved_()
+        function moved_() {
+            if (visible && active && !settling.running && !panelWindow.fullScreen && panelWindow.cockpit_ && panelWindow.cockpit_.editing)
+                still.restart()
+        }
+        onVisibleChanged: if (visible) settling.restart()
         onClosing: {
             if (panelWindow.cockpit_ && panelWindow.cockpit_.editing)
                 panelWindow.cockpit_.windowClosed(panelWindow)
             panelWindow.open = false
         }
 
+        Timer {
+            id: settling
+            interval: 1000
+        }
+        Timer {
+            id: still
+            interval: 400
+            onTriggered: {
+                const on = frame.screen, corner = { x: on ? on.virtualX : 0, y: on ? on.virtualY : 0 }
+                const x = frame.x - corner.x, y = frame.y - corner.y
+                if (x !== panelWindow.x || y !== panelWindow.y || frame.width !== panelWindow.width || frame.height !== panelWindow.height)
+                    panelWindow.cockpit_.windowMoved(panelWindow, panelWindow.screenName && on ? on.name : "", x, y, frame.width, frame.height)
+            }
+        }
         CockpitKeys { cockpit: panelWindow.cockpit_ }
         ThemeText {
             id: note
