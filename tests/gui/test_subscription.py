@@ -718,3 +718,36 @@ def test_a_message_that_has_waited_for_a_screen_that_stood_still_is_as_old_as_it
     inbox_of(endpoint).last_time -= 30
     wait(lambda: "waiting" in root.shown())
     assert root.shown() == "before false false,waiting true true"
+
+
+def test_the_log_of_either_ros_has_the_fields_of_ros2(live: Any, wait: Any) -> None:
+    """RQml's Console asks for rcl_interfaces/msg/Log."""
+    is_ros1 = live.session.url.startswith("ros1")
+    name = "rosgraph_msgs/msg/Log" if is_ros1 else "rcl_interfaces/msg/Log"
+    publisher = live.robot.create_publisher("/log", name, QoS(depth=5))
+    root = live.load('Subscription { topic: "/log"; messageType: "rcl_interfaces/msg/Log" }')
+    wait(lambda: publisher.subscription_count() > 0)
+    fields = {
+        "level": 4 if is_ros1 else 30,
+        "name": "base",
+        "msg": "low",
+        "file": "a.py",
+        "line": 3,
+    }
+    header = {"header": {"stamp": {"secs": 7, "nsecs": 5}}}
+    publisher.publish(fields | (header if is_ros1 else {"stamp": {"sec": 7, "nanosec": 5}}))
+    wait(lambda: root.property("message").isObject())
+    message = root.property("message").toVariant()
+    assert (message["level"], message["name"], message["msg"]) == (30, "base", "low")
+    assert (message["file"], message["line"], message["stamp"]["sec"]) == ("a.py", 3, 7)
+
+
+def test_requests_of_ros1_can_be_edited(live: Any) -> None:
+    if not live.session.url.startswith("ros1"):
+        pytest.skip("ROS 2 has no package roscpp")
+    root = live.load("""MessageItemModel {
+        Component.onCompleted: message = {
+            "#messageType": "roscpp/srv/SetLoggerLevelRequest", logger: "x"
+        }
+    }""")
+    assert root.property("message").toVariant() == {"logger": "x", "level": ""}

@@ -8,7 +8,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 import rosglass
-from rosglass.errors import ConversionError, Error, InvalidNameError
+from rosglass.errors import ConversionError, Error, InvalidNameError, TypeNotFoundError
 from rosglass.qml.engine.from_js import fields_from_js, scalar_from_python
 from rosglass.qml.engine.js_values import integral
 from rosglass.qml.engine.log import Caller, log_from_qml
@@ -314,7 +314,14 @@ class MessageItemModel(QtCore.QAbstractItemModel):
     def _find(self, name: str) -> MessageType:
         if self._type is not None and name in {self._type.name, self._type_name}:
             return self._type
-        kind = rosglass.load(name, ros=2)
+        runtime = self._runtime()
+        node = runtime.session.node if runtime is not None else None
+        try:
+            kind = rosglass.load(name, ros=2)
+        except TypeNotFoundError:
+            if node is None or node.wire != "ros1":
+                raise
+            kind = rosglass.load(name, ros=1)  # such as a request that only ROS 1 has
         if not isinstance(kind, rosglass.MessageType):
             raise InvalidNameError(f"{name} is not a message type")
         return kind

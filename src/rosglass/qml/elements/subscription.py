@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
     from rosglass.comm.subscription import Subscription as TopicSubscription
-    from rosglass.messages import Message
+    from rosglass.messages import Message, MessageType
+    from rosglass.messages.translation import Translation
     from rosglass.qml.engine.runtime import Runtime
 
 
@@ -50,6 +51,10 @@ ROS1_QOS = QoS(
     depth=1,
     reliability=Reliability.BEST_AVAILABLE,
     durability=Durability.BEST_AVAILABLE,
+)
+#: Types of ROS 2 that interfaces ask for by name -> the types of ROS 1 that stand for them.
+_ROS1_NAMES = dict.fromkeys(
+    ("rcl_interfaces/msg/Log", "rcl_interfaces/Log"), "rosgraph_msgs/msg/Log"
 )
 #: Seconds without a message after which messages of the past may be what is missing.
 _NO_MESSAGE_S = 2.0
@@ -102,6 +107,7 @@ class Subscription(TopicElement):
         self._profile = self._DEFAULT_QOS
         self._wanted_queue_size: int | None = None
         self._sample: Sample | None = None
+        self._translation: Translation | None = None
         #: The sample's message.
         self._message: Message | None = None
         #: Whether the sample is from the current subscription, and so from the current robot.
@@ -218,6 +224,8 @@ class Subscription(TopicElement):
 
     def _factory(self, *wanted: Any) -> Callable[[], TopicSubscription]:
         node, topic, type_name, qos = wanted
+        if node.wire == "ros1" and self.DIALECT is Dialect.ROS2:
+            type_name = _ROS1_NAMES.get(type_name, type_name)
         return lambda: node.create_subscription(topic, type_name or None, qos=qos)
 
     def _on_created(self, endpoint: TopicSubscription) -> None:
@@ -341,10 +349,22 @@ class Subscription(TopicElement):
         if message is None or runtime is None:
             return QJSValue()
         try:
+            sample, other = self._sample, _ROS1_NAMES.get(self._wanted_type)
+            if sample is not None and sample.type.name == other:
+                message = self._translated(message, sample.type)
             return runtime.message(message, self.DIALECT)
         except Error as error:
             _log.error("%s: %s", self._resolved, error)
             return QJSValue()
+
+    def _translated(self, message: Message, kind: MessageType) -> Message:
+        """Return a message of ROS 1 as one of the type of ROS 2 that was asked for."""
+        # Few interfaces need it.
+        from rosglass.messages.translation import Translation  # noqa: PLC0415
+
+        if self._translation is None or self._translation.source is not kind:
+            self._translation = Translation(kind)
+        return self._translation.convert(message)
 
     # Judging.
 
