@@ -450,3 +450,16 @@ def test_map_of_a_robot_that_is_followed_is_fitted_once(
     wait(lambda: 4 <= camera.property("span") < 6)
     wait(lambda: view.property("scene").property("robotSeen"))
     assert camera.property("centerX") == pytest.approx(view.property("scene").property("robotX"))
+
+
+def test_painted_track_follows_its_points(controls: Any) -> None:
+    from rosglass.controls.maps.marks import MapMarks
+
+    controls.show("MapView { anchors.fill: parent }")
+    marks, points = MapMarks(), [(0.0, 0.0), (1.0, 0.0)]
+    assert marks._way(points).size() == 2
+    points.append((2.0, 1.0))
+    assert marks._way(points).size() == 3
+    begun_again = [(5.0, 6.0), (6.0, 6.0)]
+    line = marks._way(begun_again)
+    assert [(line.at(n).x(), line.at(n).y()) for n in range(line.size())] == begun_again

@@ -38,6 +38,9 @@ class MapMarks(QtQuick.QQuickPaintedItem):
     def __init__(self, parent: QtQuick.QQuickItem | None = None) -> None:
         super().__init__(parent)
         self._canvas: Canvas | None = None
+        #: The points of the track, and its line.
+        self._points: list[tuple[float, float]] = []
+        self._line = QtGui.QPolygonF()
         # PySide 6.11 never frees the Python half of an object created by QML.
         state = self.__dict__
         self.destroyed.connect(lambda: state.update(_canvas=None, _scene=None))
@@ -65,8 +68,7 @@ class MapMarks(QtQuick.QQuickPaintedItem):
         if hasattr(scene, "paint_under"):
             scene.paint_under(painter, self.gridColor, self.gridSize)
         if self.track and len(scene.track.points) > 1:
-            points = [QtCore.QPointF(x, y) for x, y in scene.track.points]
-            paint_line(painter, QtGui.QPolygonF(points), view, self.trackColor)
+            paint_line(painter, self._way(scene.track.points), view, self.trackColor)
         if self._canvas is None:
             self._canvas = Canvas()
         canvas = self._canvas
@@ -75,6 +77,14 @@ class MapMarks(QtQuick.QQuickPaintedItem):
             if isinstance(layer, VectorLayer):
                 layer.paint(painter, canvas, view, getattr(self, layer.COLOR))
         canvas.show(painter)
+
+    def _way(self, points: list[tuple[float, float]]) -> QtGui.QPolygonF:
+        """Return the track, to which only new points are added."""
+        if points is not self._points:
+            self._points, self._line = points, QtGui.QPolygonF()
+        for x, y in points[self._line.size() :]:
+            self._line.append(QtCore.QPointF(x, y))
+        return self._line
 
 
 class MapArrow(QtQuick.QQuickPaintedItem):
