@@ -15,6 +15,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 pytestmark = pytest.mark.both_qt
+
+
+@pytest.fixture(autouse=True)
+def state(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Keep goals that were sent in a folder of the test."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
 TYPE = "example_interfaces/action/Fibonacci"
 
 
@@ -74,9 +82,11 @@ def test_form_has_the_fields_of_the_goal(controls: Any, counter: Any, wait: Any)
     counter.offer()
     panel = controls.show('ActionPanel { action: "/count" }')
     wait(lambda: panel.property("ready"))
-    wait(lambda: controls.find("field_order"))
+    wait(lambda: controls.find("form").property("ready"))
     write(controls, "field_order", "four")
-    assert controls.find("state").property("text") == "order is not a number"
+    said = "order: expected a whole number (int32), got 'four'"
+    assert controls.find("state").property("text") == said
+    assert controls.find("detail_order").property("text") == said
     assert not panel.property("busy")
     write(controls, "field_order", "2.5")
     wait(lambda: "order: expected" in controls.find("state").property("text"))
@@ -121,7 +131,7 @@ def test_goal_over_a_real_middleware(live_controls: Any, url: str, wait: Any) ->
     counter.offer()
     panel = live_controls.show('ActionPanel { action: "/count" }')
     wait(lambda: panel.property("ready"))
-    wait(lambda: panel.property("formType_"))
+    wait(lambda: live_controls.find("form").property("ready"))
     write(live_controls, "field_order", "5")
     wait(lambda: panel.property("outcome") == "succeeded")
     write(live_controls, "field_order", "13")
@@ -166,7 +176,7 @@ def test_types_that_only_the_robot_has(
             ServiceButton { objectName: "fill"; service: "/fill"; request: ({count: 3}) }
         }""")
         panel, button = live_controls.find("dig"), live_controls.find("fill")
-        wait(lambda: panel.property("formType_") and button.property("ready"))
+        wait(lambda: live_controls.find("form").property("ready") and button.property("ready"))
         write(live_controls, "field_tool", "<b>spade</b>")
         wait(lambda: panel.property("outcome") == "succeeded")
         write(live_controls, "field_depth", "1.5")

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import suppress
 from decimal import Decimal, InvalidOperation
 from typing import TYPE_CHECKING, Any
 
@@ -444,12 +445,20 @@ class MessageFields(Element):
 
 def _load(name: str) -> MessageType:
     """Return the type of the message, request or goal that a form of a type fills in."""
-    found = rosglass.load(name, ros=2)
+    found = _found(name)
     parts: dict[str, MessageType] = getattr(found, "parts", {"message": found})
     first = next((parts[part] for part in ("message", "request", "goal") if part in parts), None)
     if first is None:
         raise InvalidNameError(f"{name} is not a type of a message, service or action")
     return first
+
+
+def _found(name: str) -> Any:
+    """Return a type of ROS 2, or that of ROS 1, which names actions after a message of theirs."""
+    for ros, one in ((2, name), (1, name), (1, name.removesuffix("Action"))):
+        with suppress(TypeNotFoundError):  # the next one may exist
+            return rosglass.load(one, ros=ros)
+    return rosglass.load(name, ros=2)
 
 
 def _unfolded(schema: Schema) -> list[str]:

@@ -77,11 +77,10 @@ LiveFrame {
     // Seconds since the last feedback.
     property double fedAt_: 0
     property real silence_: 0
-    // The form: [{path, kind, text}], how many more fields the goal has, and what is wrong with it.
-    property var entries_: []
-    property int left_: 0
+    // The type of the form, and what is wrong with it.
     property string formType_
     property string formProblem_
+    readonly property Item fields_: formLoader.item
     readonly property bool form_: (goal === undefined || goal === null) && !goals.length
     readonly property bool sendable_: ready && !busy && obstacle === ""
     // The text of the goal's button.
@@ -222,39 +221,17 @@ LiveFrame {
     // The form.
 
     function readForm_() {
-        if (!formType_) {
-            formProblem_ = qsTr("the fields of the goal are not known yet")
-            return null
-        }
-        const value = {}
-        for (const entry of entries_) {
-            try {
-                Fields.assign(value, entry.path, Fields.parse(entry.kind, entry.text))
-            } catch (error) {
-                formProblem_ = Fields.fill(qsTr("%1 %2"), [entry.path, error.message])
-                return null
-            }
-        }
-        formProblem_ = ""
-        return value
+        const filled = fields_ && fields_.ready ? fields_.message() : undefined
+        if (filled === undefined)
+            formProblem_ = fields_ && fields_.problem ? Fields.bounded(fields_.problem) : qsTr("the fields of the goal are not known yet")
+        else
+            fields_.remember()
+        return filled === undefined ? null : filled
     }
 
     function fillForm_() {
-        if (!form_ || !ready || !name_)
-            return
-        const found = type || Ros2.getActionTypes(name_)[0] || ""
-        if (!found || found === formType_)
-            return
-        const empty = Ros2.createEmptyActionGoal(found)
-        if (!empty) {
-            formProblem_ = qsTr("the type %1 is unknown here: set `goal`").arg(Fields.bounded(found, 80))
-            return
-        }
-        const made = Fields.entries(empty, 40)
-        formType_ = found
-        formProblem_ = ""
-        entries_ = made.list
-        left_ = made.left
+        if (form_ && ready && name_)
+            formType_ = type || Ros2.getActionTypes(name_)[0] || formType_
     }
 
     function connect_() {
@@ -269,7 +246,6 @@ LiveFrame {
         }
         client_ = null
         wrong_ = formType_ = formProblem_ = ""
-        entries_ = []
         if (!action) {
             wrong_ = qsTr("no action is given")
             return
@@ -331,46 +307,21 @@ LiveFrame {
             width: parent.width
             spacing: Theme.gap / 2
 
-            Repeater {
-                model: panel.form_ ? panel.entries_ : []
-                delegate: Item {
-                    id: row
-                    width: column.width
-                    height: Theme.touch
-                    ThemeText {
-                        anchors { left: parent.left; right: parent.horizontalCenter; rightMargin: Theme.gap; verticalCenter: parent.verticalCenter }
-                        text: modelData.path
-                        color: Theme.dim
-                        elide: Text.ElideLeft
-                    }
-                    ThemeField {
-                        objectName: "field_" + modelData.path
-                        anchors { left: parent.horizontalCenter; right: parent.right }
-                        visible: modelData.kind !== "bool"
-                        enabled: !panel.busy
-                        text: modelData.text
-                        maximumLength: 10000
-                        Accessible.name: modelData.path
-                        onTextEdited: { modelData.text = text; panel.entries_[index].text = text; panel.formProblem_ = "" }
-                        onAccepted: if (!panel.hold) panel.send()
-                    }
-                    ThemeSwitch {
-                        objectName: "switch_" + modelData.path
-                        anchors { left: parent.horizontalCenter }
-                        visible: modelData.kind === "bool"
-                        enabled: !panel.busy
-                        checked: modelData.text === "true"
-                        Accessible.name: modelData.path
-                        onToggled: panel.entries_[index].text = String(checked)
-                    }
-                }
-            }
-            ThemeText {
+            Loader {
+                id: formLoader
                 width: parent.width
-                visible: panel.form_ && panel.left_ > 0
-                text: qsTr("%1 more fields have their defaults").arg(panel.left_)
-                color: Theme.warn
-                font.pixelSize: Theme.small
+                active: panel.form_
+                visible: active
+                sourceComponent: MessageForm {
+                    objectName: "form"
+                    width: column.width
+                    height: implicitHeight
+                    type: panel.formType_
+                    scrolls: false
+                    enabled: !panel.busy
+                    onEdited: panel.formProblem_ = ""
+                    onAccepted: if (!panel.hold) panel.send()
+                }
             }
             Grid {
                 width: parent.width
@@ -404,7 +355,7 @@ LiveFrame {
                     width: parent.half
                     visible: !panel.hold && !panel.goals.length
                     text: panel.sendText
-                    enabled: panel.sendable_ && (!panel.form_ || panel.formType_ !== "")
+                    enabled: panel.sendable_ && (!panel.form_ || (panel.fields_ !== null && panel.fields_.valid))
                     onClicked: panel.send()
                 }
                 ThemeHoldButton {
@@ -413,7 +364,7 @@ LiveFrame {
                     visible: panel.hold && !panel.goals.length
                     text: panel.sendText
                     delay: Math.round(1000 * (panel.holdTime > 0 ? panel.holdTime : 1))
-                    enabled: panel.sendable_ && (!panel.form_ || panel.formType_ !== "")
+                    enabled: panel.sendable_ && (!panel.form_ || (panel.fields_ !== null && panel.fields_.valid))
                     onActivated: panel.send()
                 }
                 ThemeButton {

@@ -62,52 +62,6 @@ function summary(message, most) {
     return parts.join(" · ") + (left ? " · +" + left : "")
 }
 
-// The fields of a message to edit: [{path, kind, text}]; kind is "bool", "number", "text" or "json".
-function entries(message, most) {
-    const made = []
-    const left = walk(message, function (path, value) {
-        const kind = isList(value) ? "json" : typeof value === "boolean" ? "bool" : typeof value === "number" ? "number" : "text"
-        const plain = kind === "json" && !Array.isArray(value) ? value.toArray() : value
-        made.push({ path: path, kind: kind, text: kind === "json" ? JSON.stringify(plain) : String(value) })
-    }, most)
-    return { list: made, left: left }
-}
-
-// The value that a text stands for; throws an Error in words.
-function parse(kind, text) {
-    const given = text.trim()
-    if (kind === "text")
-        return text
-    if (kind === "bool") {
-        if (given !== "true" && given !== "false")
-            throw new Error(qsTr("is true or false"))
-        return given === "true"
-    }
-    if (kind === "number") {
-        const special = { nan: NaN, inf: Infinity, "+inf": Infinity, "-inf": -Infinity }[given.toLowerCase()]
-        const number = special === undefined ? Number(given) : special
-        if (given === "" || (isNaN(number) && special === undefined))
-            throw new Error(qsTr("is not a number"))
-        // Longer integers than JavaScript's keep all their digits as text.
-        return Number.isInteger(number) && !Number.isSafeInteger(number) ? given : number
-    }
-    try {
-        const value = JSON.parse(given || "[]")
-        if (Array.isArray(value))
-            return value
-    } catch (error) {}
-    throw new Error(qsTr("is not a list, such as [1, 2]"))
-}
-
-// Sets the field with this path in a message made of plain objects.
-function assign(message, path, value) {
-    const names = path.split(".")
-    let at = message
-    for (const name of names.slice(0, -1))
-        at = at[name] = at[name] || {}
-    at[names[names.length - 1]] = value
-}
-
 // Why a server refused, by its response; empty if it did not. Responses say so by `success` (std_srvs and most
 // others) or `ok`, and give the reason as `message`, `status_message`, `error_message`, `reason` or `error`.
 function refusal(response) {
