@@ -55,6 +55,7 @@ Item {
         y: (panelWindow.screen_ ? panelWindow.screen_.virtualY : 0) + (panelWindow.fullScreen ? 0 : panelWindow.y)
         width: panelWindow.screen_ ? Math.min(panelWindow.fullScreen ? panelWindow.screen_.width : panelWindow.width, panelWindow.screen_.width) : panelWindow.width
         height: panelWindow.screen_ ? Math.min(panelWindow.fullScreen ? panelWindow.screen_.height : panelWindow.height, panelWindow.screen_.height) : panelWindow.height
+        visible: panelWindow.open
         visibility: !panelWindow.open ? Window.Hidden : panelWindow.fullScreen ? Window.FullScreen : Window.Windowed
         // Where the hand has put it, in edit mode: once it lies still, and not where a window manager puts a new one.
         onXChanged: moved_()
