@@ -605,3 +605,13 @@ def test_an_interface_that_asks_for_no_node_is_shown_the_line_to_add(
     finally:
         runner.close()
         runner.session.close()
+
+
+def test_own_file_that_a_control_hides_is_named(runner: Runner, file: Path, caplog: Any) -> None:
+    own = file.parent / "Battery.qml"
+    own.write_text("import QtQuick 2.15\nItem {}\n")
+    (file.parent / "Mine.qml").write_text("import QtQuick 2.15\nItem {}\n")
+    file.write_text("import QtQuick 2.15\nimport RosControls 1.0\nItem { Battery {} }\n")
+    runner.load()
+    assert f"{own} is not used: import RosControls has a type of this name" in caplog.text
+    assert "Mine.qml" not in caplog.text

@@ -14,7 +14,14 @@ from rosglass.errors import Error, QmlError
 from rosglass.qml.engine.log import forget_repeats, log_engine_warnings
 from rosglass.qml.engine.watchdog import Watchdog
 from rosglass.qml.run.load_errors import error_list
-from rosglass.qml.run.modules import import_folder, install, interface_file, is_own_window, locate
+from rosglass.qml.run.modules import (
+    IMPORT_PATHS,
+    import_folder,
+    install,
+    interface_file,
+    is_own_window,
+    locate,
+)
 from rosglass.qml.run.renderer_choice import imported_modules
 from rosglass.qt import QT6, QtCore, QtQml, Signal, address, is_alive
 
@@ -179,6 +186,19 @@ def register_imports(file: Path, engine: QtQml.QQmlEngine, text: str | None = No
     found = imported_modules(file, engine.importPathList(), text)
     for module in sorted(found & _REGISTERED_BY.keys()):
         import_module(_REGISTERED_BY[module]).register()
+        _warn_of_hidden_files(file, module)
+
+
+def _warn_of_hidden_files(file: Path, module: str) -> None:
+    """Name the files beside a file whose types the types of an imported module hide."""
+    folders = [path / module for path in IMPORT_PATHS]
+    known = set(getattr(import_module(_REGISTERED_BY[module]), "TYPES", ()))
+    known |= {found.stem for folder in folders for found in folder.glob("[A-Z]*.qml")}
+    for own in sorted(file.parent.glob("[A-Z]*.qml")):
+        if own.stem in known and own != file and file.parent not in folders:
+            _log.warning(
+                "%s is not used: import %s has a type of this name; rename the file", own, module
+            )
 
 
 #: The QML file of a closable item that is only as large as its text.
