@@ -92,9 +92,10 @@ def settled(wait: QtWaiting, window: Any) -> Any:
 def texts(window: Any) -> list[dict[str, Any]]:
     """Return the visible texts: their places, bounds and colours."""
     found = []
-    waiting = [(window.contentItem(), QtCore.QRectF(0, 0, window.width(), window.height()), False)]
+    whole = QtCore.QRectF(0, 0, window.width(), window.height())
+    waiting = [(window.contentItem(), whole, False, False)]
     while waiting:
-        item, bounds, dimmed = waiting.pop()
+        item, bounds, dimmed, scrolled = waiting.pop()
         if not item.isVisible() or item.opacity() == 0:
             continue
         # What is old, or cannot be used, is dimmed.
@@ -107,12 +108,14 @@ def texts(window: Any) -> list[dict[str, Any]]:
                     "place": rectangle(place),
                     "bounds": rectangle(bounds),
                     "dimmed": dimmed,
+                    "scrolled": scrolled,
                     "color": item.property("color").name(),
                 }
             )
         if item.clip():
             bounds = bounds.intersected(place)
-        waiting += [(child, bounds, dimmed) for child in item.childItems()]
+        scrolled = scrolled or item.inherits("QQuickFlickable")
+        waiting += [(child, bounds, dimmed, scrolled) for child in item.childItems()]
     return found
 
 
