@@ -90,7 +90,7 @@ def interface(kind: str) -> str:
     else:
         splits = "".join("Split {\n" + "\n".join(row) + "\n}\n" for row in panels)
         pages = f"Page {{ orientation: Qt.Vertical\n{splits} }}\n"
-    return f"{head}Cockpit {{ {size}\n{pages}{squares} }}\n"
+    return f"{head}Cockpit {{ {size}\n{pages}Item {{ y: -parent.y\n{squares} }} }}\n"
 
 
 def publish(url: str) -> None:

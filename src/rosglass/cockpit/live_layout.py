@@ -43,7 +43,7 @@ _KINDS = {
 #: Properties that a panel keeps when its content cannot be shown.
 _KEPT = ("id", "objectName", "title", "share", "minimumSize")
 #: Suffixes of classes that QML derives, and prefixes of Qt's own.
-_CLASS = re.compile(r"^(?:QQuick|QQml)?(.*?)(?:_QML(?:TYPE)?_\d+)*$")
+_CLASS = re.compile(r"^(?:QQuick|QQml)?(\w+?)(?:_QML(?:TYPE)?_\d+)*\(")
 
 
 class _NotFollowedError(Exception):
@@ -226,7 +226,7 @@ class LiveLayout(QtCore.QObject):
                 _log.error("%s", error)
                 shown = _with_problem(shown, panel, str(error))
                 continue
-            if _class_of(made.root) != "Cockpit":
+            if _kind_of(made.root) != "Cockpit":
                 self._live.drop(made)
                 name = document.root.type
                 raise QmlError(f"{self._live.path}: a layout's root is a Cockpit, not {name}")
@@ -565,16 +565,22 @@ def _elements_on_screen(item: Any) -> dict[str, list[Any]]:
 
 def _content_of(item: Any) -> list[Any]:
     """Return the objects of the default property."""
-    meta = item.metaObject()
-    at = meta.indexOfClassInfo("DefaultProperty")
-    if at < 0:
+    # Not by metaObject(), whose wrapper outlives the object: PySide takes the next one at its
+    # address for it.
+    name: Any = QtQml.QQmlProperty(item).name()
+    found = QtQml.QQmlListReference(item, name) if name else None
+    if found is None or not found.isReadable():
         return []
-    found = QtQml.QQmlListReference(item, meta.classInfo(at).value())
-    return [found.at(number) for number in range(found.count())] if found.isReadable() else []
+    return [found.at(number) for number in range(found.count())]
 
 
 def _class_of(item: Any) -> str:
-    found = _CLASS.match(str(item.metaObject().className()))
+    """Return the type of an object; see :func:`_content_of`."""
+    context = QtQml.QQmlEngine.contextForObject(item)
+    if context is None:
+        return ""
+    text = QtQml.QQmlExpression(context, item, "'' + this").evaluate()
+    found = _CLASS.match(str(text[0] if isinstance(text, tuple) else text))
     return found[1] if found else ""
 
 
