@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from itertools import pairwise
+from collections import Counter
+from itertools import islice, pairwise
 from typing import TYPE_CHECKING
 
 from rosglass.cockpit.history import History
@@ -487,9 +488,11 @@ class Document:
         return self.position(item.span.start)[0]
 
     def _splice(self, splices: Iterable[tuple[int, int, str]]) -> Document:
-        text = self.text
-        for start, end, new in sorted(splices, reverse=True):
-            text = text[:start] + new + text[end:]
+        parts, at = [], 0
+        for start, end, new in sorted(splices):
+            parts += [self.text[at:start], new]
+            at = end
+        text = "".join([*parts, self.text[at:]])
         if text == self.text:
             return self
         changed = Document(text, self.file)
@@ -614,25 +617,21 @@ class Document:
         return target.parent
 
     def _indent_unit(self) -> str:
-        counts: dict[str, int] = {}
-        for found in self.objects():
+        """Return the most frequent step of indentation at the beginning of the file."""
+        counts: Counter[str] = Counter()
+        for found in islice(self.objects(), 200):
             outer = self._indent(found.span.start)
             for item in found.items[:1]:
                 inner = self._indent(item.span.start)
-                if (
-                    self._starts_line(item.span.start)
-                    and inner.startswith(outer)
-                    and inner != outer
-                ):
-                    unit = inner[len(outer) :]
-                    counts[unit] = counts.get(unit, 0) + 1
-            if sum(counts.values()) > 100:
-                break
-        return max(counts, key=lambda unit: counts[unit]) if counts else "    "
+                if self._starts_line(item.span.start) and inner.startswith(outer):
+                    counts[inner[len(outer) :]] += inner != outer
+        unit, count = counts.most_common(1)[0] if counts else ("", 0)
+        return unit if count else "    "
 
     def _child_indent(self, owner: Object, near: Member | Object | None) -> str:
         """Return the indentation of the items of an object."""
-        items = [near, *owner.items] if near is not None else owner.items
+        items = owner.items[:20]
+        items = [near, *items] if near is not None else items
         for item in items:
             if self._starts_line(item.span.start):
                 return self._indent(item.span.start)

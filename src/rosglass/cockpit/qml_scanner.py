@@ -176,6 +176,7 @@ class Object:
         items: Members and children, in the order of the text.
         objects: Children and objects that are values, in the order of the text, those in groups
             included; each has this object as its parent.
+        index: Place in the `objects` of its parent.
     """
 
     source: str = field(repr=False)
@@ -187,6 +188,7 @@ class Object:
     on: str = ""
     items: list[Member | Object] = field(default_factory=list, repr=False)
     objects: list[Object] = field(default_factory=list, repr=False)
+    index: int = 0
 
     @property
     def members(self) -> list[Member]:
@@ -220,7 +222,7 @@ class Object:
         path = []
         child, parent = self, self.parent
         while parent is not None:
-            path.append(parent.objects.index(child))
+            path.append(child.index)
             child, parent = parent, parent.parent
         return tuple(reversed(path))
 
@@ -707,7 +709,7 @@ class Scanner:
             # Objects in groups belong to the object around.
             while holder.member is not None and holder.member.group is holder:
                 holder = holder.member.owner
-            opened.parent = holder
+            opened.parent, opened.index = holder, len(holder.objects)
             holder.objects.append(opened)
             if member is not None:
                 member.objects.append(opened)

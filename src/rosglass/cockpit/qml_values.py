@@ -240,12 +240,11 @@ class _Literals:
 def _number(text: str) -> int | float:
     digits = text.lstrip("+-")
     sign = -1 if text.startswith("-") else 1
-    if digits[:2].lower() in {"0x", "0b", "0o"}:
-        return sign * int(digits, 0)
-    if not digits.isdecimal():
+    whole = digits.isdecimal()
+    if digits[:2].lower() not in {"0x", "0b", "0o"} and not whole:
         return sign * float(digits)
-    if len(digits) > 400:
-        return sign * math.inf
-    if digits != "0" and digits.startswith("0"):
+    if whole and digits != "0" and digits.startswith("0"):
         raise ValueError("an octal number")
-    return sign * int(digits)
+    # As in JavaScript, which has doubles only.
+    value = int(digits, 0) if len(digits) <= 1100 else 1 << 1024
+    return sign * (value if value < 1 << 1024 else math.inf)

@@ -422,6 +422,29 @@ class TestHostileText:
         with pytest.raises(QmlSyntaxError, match="expected"):
             Document(text)
 
+    @pytest.mark.timeout(60)  # hours, if the cost were quadratic
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "Item { " + "A { b: 1 } " * 60_000 + "}",
+            "Item {\n" + "// a\n" * 300_000 + "A {}\n}",
+            "Item {\n" + "a: `\n`\n" * 60_000 + "A {}\n}",
+            "Item { l: [\n" + "A {}, // x\n" * 60_000 + "A {}] }",
+        ],
+        ids=lambda text: f"{text[:20]}...",
+    )
+    def test_large_files_are_edited_in_linear_time(self, text: str) -> None:
+        document = Document(text)
+        last = document.root.objects[-1]
+        assert document.at(last.path) is last
+        after = document.set_property(last, "new", "x" * 200)
+        after = after.move_object(after.at(last.path), after.root, 0)
+        assert after.root.children[0].get("new") is not None
+        after = after.wrap_object(after.root.children[0], "W {}")
+        after = after.remove_object(after.root.children[0])
+        assert len(after.root.objects) == len(document.root.objects) - 1
+        assert document.set_id(document.root, "a").root.id == "a"
+
 
 ROOT = Path(rosglass.__file__).parents[2]
 
