@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rosglass.controls.lists.row_model import RowModel
 from rosglass.controls.lists.texts import bounded
 from rosglass.errors import ConversionError
-from rosglass.qml.elements.message_item_model import TreeItem
+from rosglass.qml.elements.message_item_model import TreeItem, check_leaf
+from rosglass.qml.engine.from_js import scalar_from_python
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from rosglass.messages.schema import Schema
     from rosglass.qt import QtCore
 
-__all__ = ["FieldRow", "FieldTree", "fits_line", "number_text", "parsed_text", "value_text"]
+__all__ = ["FieldRow", "FieldTree", "entered_value", "fits_line", "number_text", "value_text"]
 
 #: Elements of an array that are shown below it; longer ones are divided into ranges.
 _MAX_ELEMENTS = 100
@@ -212,12 +213,17 @@ def number_text(item: TreeItem, value: Any) -> str:
     return next((text for text in texts if _FLOAT.unpack(_FLOAT.pack(float(text)))[0] == value), "")
 
 
-def parsed_text(text: str, item: TreeItem) -> Any:
-    """Return the value that was typed for a leaf.
+def entered_value(text: str, item: TreeItem) -> Any:
+    """Return the value that was typed for a leaf, in the type of its field.
 
     Raises:
-        ConversionError: It is neither a number nor a bool, where the field is one.
+        ConversionError: It does not fit.
     """
+    assert item.member is not None
+    return check_leaf(item, scalar_from_python(_parsed(text, item), item.member))
+
+
+def _parsed(text: str, item: TreeItem) -> Any:
     member = item.member
     assert member is not None
     if member.number is None:

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import rosglass
 from rosglass.controls.lists.field_hints import choices_of, range_of
-from rosglass.controls.lists.field_tree import FieldTree, fits_line, parsed_text, value_text
+from rosglass.controls.lists.field_tree import FieldTree, entered_value, fits_line, value_text
 from rosglass.controls.lists.message_store import MessageStore, Stored
 from rosglass.controls.lists.texts import bounded
 from rosglass.errors import ConversionError, Error, InvalidNameError, TypeNotFoundError
 from rosglass.qml.elements.element import RETRY_MS, Element, single_shot
 from rosglass.qml.elements.message_item_model import check_leaf, default_element, plain_tree
-from rosglass.qml.engine.from_js import fields_from_js, scalar_from_python
+from rosglass.qml.engine.from_js import fields_from_js
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
 from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive
@@ -232,7 +232,7 @@ class MessageFields(Element):
         text = named.get(text.strip(), text)
         try:
             if item.is_leaf:
-                item.set(check_leaf(item, scalar_from_python(parsed_text(text, item), item.member)))
+                item.set(entered_value(text, item))
             else:
                 _set_value(item, _time_of(text, item))
         except ConversionError as error:

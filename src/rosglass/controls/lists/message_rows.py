@@ -6,12 +6,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import QoS
-from rosglass.controls.lists.field_tree import FieldTree, fits_line, parsed_text, value_text
+from rosglass.controls.lists.field_tree import FieldTree, entered_value, fits_line, value_text
 from rosglass.controls.lists.texts import bounded, copy_text
 from rosglass.controls.topics.live_topic import LiveTopic
 from rosglass.errors import ConversionError, Error
-from rosglass.qml.elements.message_item_model import check_leaf, plain_tree
-from rosglass.qml.engine.from_js import scalar_from_python
+from rosglass.qml.elements.message_item_model import plain_tree
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import QJSValue, QtCore, Slot
 
@@ -153,7 +152,7 @@ class MessageRows(LiveTopic):
             return False
         item = field.item
         try:
-            item.set(check_leaf(item, scalar_from_python(parsed_text(text, item), item.member)))
+            item.set(entered_value(text, item))
         except ConversionError as error:
             report(self, refusal=str(error))
             return False
