@@ -43,6 +43,8 @@ _ROS2_TYPES = _ROOT / "qml/imports/Ros2"
 _PLAIN_IMPORT, _SCENE_IMPORT = "RosControls 1.0", "RosScene 1.0 as Scene"
 #: Files of a folder that are listed, and bytes of one that is read.
 _MAX_FILES, _MAX_BYTES = 500, 1_000_000
+_WORD = re.compile(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])")
+_LONG_WORD = re.compile(r"[a-z]{4,}")
 #: Letters of a text that is compared with similar ones.
 _MAX_LETTERS = 40
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage",
@@ -290,8 +292,8 @@ def search(text: str, names: Sequence[str], lines: Sequence[str] | None = None) 
     """Return the indices of the names that a text finds, best first; all for an empty text.
 
     Names that start with the text come first, then those whose words do, then those that contain
-    it, whose line contains it, and those that are written similarly: one typo from three letters
-    on, two from six on.
+    it or whose line does. If there are none, those that are written similarly: with one typo from
+    three letters on, with two from six on.
 
     Args:
         text: What was typed.
@@ -301,35 +303,52 @@ def search(text: str, names: Sequence[str], lines: Sequence[str] | None = None) 
     wanted = text.strip().lower().replace(" ", "")
     if not wanted:
         return list(range(len(names)))
-    ranked = []
-    for at, name in enumerate(names):
-        rank = _rank(wanted, name, lines[at] if lines is not None else "")
-        if rank is not None:
-            ranked.append((rank, at))
-    return [at for _, at in sorted(ranked)]
-
-
-def _rank(wanted: str, name: str, line: str) -> int | None:
-    plain = re.sub(r"[^a-z0-9]", "", name.lower())
-    words = [word.lower() for word in re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name)]
+    said = lines if lines is not None else [""] * len(names)
     asked = re.sub(r"[^a-z0-9]", "", wanted) or wanted
+    for rank_of in (_rank, _similarity):
+        ranked = [
+            (rank, at)
+            for at, (name, line) in enumerate(zip(names, said, strict=True))
+            if (rank := rank_of(asked, wanted, name, line)) is not None
+        ]
+        if ranked:
+            return [at for _, at in sorted(ranked)]
+    return []
+
+
+def _rank(asked: str, wanted: str, name: str, line: str) -> int | None:
+    plain = re.sub(r"[^a-z0-9]", "", name.lower())
     if plain.startswith(asked):
         return 0
-    if any(word.startswith(asked) for word in words):
+    if any(word.startswith(asked) for word in _words(name)):
         return 1
     if asked in plain or wanted in name.lower():
         return 2
-    said = line.lower()
-    if wanted in said.replace(" ", ""):
-        return 3
+    return 3 if line and wanted in line.lower().replace(" ", "") else None
+
+
+def _similarity(asked: str, wanted: str, name: str, line: str) -> int | None:
+    del wanted
     allowed = min(2, len(asked) // 3)
     if not allowed or len(asked) > _MAX_LETTERS:
         return None
+    parts = [re.sub(r"[^a-z0-9]", "", part) for part in name.lower().split("/")]
     # With the beginning of a word, as the rest may not be typed yet.
-    for rank, candidates in ((4, (plain, *words)), (5, re.findall(r"[a-z]{4,}", said)[:40])):
-        if any(_differs_by(asked, word[: len(asked) + 1], allowed) for word in candidates):
-            return rank
+    for rank, candidates in (
+        (0, (*parts, *_words(name))),
+        (1, _LONG_WORD.findall(line.lower())[:40]),
+    ):
+        for word in candidates:
+            start = word[: len(asked) + 1]
+            # Most words differ in more letters: they need no closer look.
+            missing = sum(letter not in start for letter in asked)
+            if missing <= allowed and _differs_by(asked, start, allowed):
+                return rank
     return None
+
+
+def _words(name: str) -> list[str]:
+    return [word.lower() for word in _WORD.findall(name)]
 
 
 def _differs_by(one: str, other: str, most: int) -> bool:

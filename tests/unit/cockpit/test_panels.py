@@ -154,6 +154,12 @@ def test_search_forgives_typos(text: str, first: str | None) -> None:
     assert [names[at] for at in found[:1]] == ([first] if first else [])
 
 
+def test_search_forgives_typos_in_parts_of_topics() -> None:
+    names = ["/robot1/camera/image_raw", "/robot1/battery_state", "/cmd_vel"]
+    for text, found in (("imgae_raw", 0), ("batery", 1), ("cmdvle", 2), ("robto1", 0)):
+        assert panels.search(text, names)[0] == found
+
+
 def test_search_finds_all_for_no_text_and_nothing_for_nonsense() -> None:
     names = list(CATALOGUE)
     assert len(panels.search(" ", names)) == len(names)
