@@ -161,7 +161,7 @@ class CockpitProgram(QtCore.QObject):
         self._live: LiveLayout | None = None
         self._at_home = True
         self._said_at = 0.0
-        self._reply: Callable[[int], None] | None = None
+        self._reply: Callable[[int], object] | None = None
         self._tour: list[subprocess.Popen[bytes]] = []
         self._wanted = ""
         self._properties: PropertyModel | None = None
@@ -352,7 +352,7 @@ class CockpitProgram(QtCore.QObject):
         self._said_at = time.monotonic()
         report(self, message=text)
 
-    def _ask(self, text: str, answers: list[str], reply: Callable[[int], None]) -> None:
+    def _ask(self, text: str, answers: list[str], reply: Callable[[int], object]) -> None:
         self._reply = reply
         report(self, answers=answers, question=text)
 
@@ -781,17 +781,48 @@ class CockpitProgram(QtCore.QObject):
 
     # -- files -----------------------------------------------------------------------------------
 
-    @Slot(str, QtCore.QUrl)
-    def useFile(self, purpose: str, url: QtCore.QUrl) -> None:
-        """Use a file for a command that has asked for one."""
-        path = url.toLocalFile()
-        report(self, folder=QtCore.QUrl.fromLocalFile(str(Path(path).parent)))
+    @Slot(result=QtCore.QObject)
+    def findNameField(self) -> QtCore.QObject | None:
+        """Return where the name is typed in Qt's own file dialog; None in those of the system."""
+        found = self._window.findChildren(QtCore.QObject, "fileNameTextField")
+        return next((one for one in found if one.property("visible")), None)
+
+    @Slot(result=QtCore.QUrl)
+    def proposedFile(self) -> QtCore.QUrl:
+        """Return the file that `save as` proposes."""
+        folder = Path(self.folder.toLocalFile() or Path.cwd())
+        return QtCore.QUrl.fromLocalFile(self.path or str(folder / "cockpit.qml"))
+
+    @Slot(str, QtCore.QUrl, bool)
+    def useFile(self, purpose: str, url: QtCore.QUrl, ask: bool) -> None:
+        """Use a file for a command that has asked for one.
+
+        Args:
+            purpose: The command.
+            url: The file.
+            ask: Whether to ask before a file is replaced: the dialog has not.
+        """
+        # Qt's dialog joins absolute paths, and those with ~, to the folder that it shows.
+        path = Path(url.toLocalFile())
+        _, found, typed = url.path().partition("//")
+        if found:
+            path = Path("/", typed.lstrip("/"))
+        _, found, typed = url.path().partition("/~/")
+        if found:
+            path = Path.home() / typed
+        report(self, folder=QtCore.QUrl.fromLocalFile(str(path.parent)))
         if purpose == "open":
-            self.open(path)
-        elif purpose == "save as":
-            self.save(path)
+            self.open(str(path))
         elif purpose == "open recording":
             self.connectTo(f"replay:{path}")
+        elif ask and path.exists() and str(path) != self.path:
+            self._ask(
+                self.tr("{} exists already.").format(path),
+                [self.tr("Replace it"), self.tr("Go on")],
+                lambda index: self.save(str(path)) if index == 0 else None,
+            )
+        else:
+            self.save(str(path))
 
     @Slot(str, result=bool)
     def save(self, path: str) -> bool:
