@@ -185,6 +185,20 @@ def test_escape_cancels_a_drag(layouts: Any, hand: Hand) -> None:
     assert wishes(layouts) == []
 
 
+def test_a_panel_is_chosen_when_it_is_let_go(layouts: Any, hand: Hand) -> None:
+    """An editor shows its form then, which must not move the layout below a drag."""
+    target = layouts.point("b", 0.5, 0.5)
+    hand.press(hand.title("a"))
+    hand.move(target)
+    assert layouts.root.property("current") is None
+    hand.release(target)
+    assert layouts.root.property("current") is layouts.find("a")
+    hand.press(hand.title("b"))
+    assert layouts.root.property("current") is layouts.find("a")
+    hand.release(hand.title("b"))
+    assert layouts.root.property("current") is layouts.find("b")
+
+
 def test_nothing_moves_in_use_mode(layouts: Any, hand: Hand) -> None:
     layouts.root.setProperty("editing", False)
     layouts.wait(lambda: layouts.search("handle0") is None)

@@ -9,6 +9,8 @@ Item {
     property Item cockpit: null
     // The panel that is dragged, and the one whose size the arrow keys change; null without one.
     property Item panel: null
+    // Whether a title is pressed.
+    property bool holding: false
     property Item resized: null
     // Where the panel would go now; see the signal moved of Cockpit. Without a target, nowhere.
     property var target: null

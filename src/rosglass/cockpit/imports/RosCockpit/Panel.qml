@@ -57,9 +57,13 @@ Item {
 
     // Gives the keyboard to the panel, so that its keys go to it.
     function focusTitle() {
-        if (cockpit_)
-            cockpit_.current = panel
+        choose_()
         bar.forceActiveFocus()
+    }
+
+    function choose_() {
+        if (cockpit_ && !(cockpit_.drag_ && cockpit_.drag_.holding))
+            cockpit_.current = panel
     }
 
     function toggleMaximized() {
@@ -160,7 +164,7 @@ Item {
         Accessible.role: Accessible.Grouping
         Accessible.name: panel.title_
         Accessible.description: panel.problem || panel.status_
-        onActiveFocusChanged: if (activeFocus && panel.cockpit_) panel.cockpit_.current = panel
+        onActiveFocusChanged: if (activeFocus) panel.choose_()
 
         Rectangle {
             anchors.fill: parent

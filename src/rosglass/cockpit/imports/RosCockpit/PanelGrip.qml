@@ -13,10 +13,14 @@ MouseArea {
 
     acceptedButtons: Qt.LeftButton | Qt.RightButton
     preventStealing: true
+    cursorShape: !drag_ ? Qt.ArrowCursor : dragging_ ? Qt.ClosedHandCursor : Qt.OpenHandCursor
 
     onPressed: function(mouse) {
         if (!panel)
             return
+        // In edit mode, it is chosen when it is let go: what an editor shows of it must not move the places to drop at.
+        if (drag_)
+            drag_.holding = true
         panel.focusTitle()
         start_ = Qt.point(mouse.x, mouse.y)
         if (mouse.button === Qt.RightButton)
@@ -34,14 +38,19 @@ MouseArea {
         if (dragging_)
             drag_.move(mapToGlobal(mouse.x, mouse.y))
     }
-    onReleased: {
-        if (dragging_ && drag_)
-            drag_.drop()
+    onReleased: end_(true)
+    onCanceled: end_(false)
+    function end_(drops) {
+        const one = panel, drag = drag_, was = dragging_
         dragging_ = false
-    }
-    onCanceled: {
-        if (dragging_ && drag_)
-            drag_.cancel()
-        dragging_ = false
+        if (!drag)
+            return
+        drag.holding = false
+        if (one && cockpit_)
+            cockpit_.current = one
+        if (was && drops)
+            drag.drop()
+        else if (was)
+            drag.cancel()
     }
 }
