@@ -352,12 +352,13 @@ class Scanner:
 
     def _qualified(self, at: int, expected: str) -> tuple[str, int, int]:
         name, start, end = self._name(at, expected)
+        parts = [name]
         while True:
             _, token, _, after, _ = self._next(end)
             if token != ".":
-                return name, start, end
-            part, _, end = self._name(after, f"a name after {name}.")
-            name += f".{part}"
+                return ".".join(parts), start, end
+            name, _, end = self._name(after, f"a name after {name}.")
+            parts.append(name)
 
     def _template(self, at: int) -> tuple[int, bool]:
         """Return the end of a template's text, and whether an expression follows."""
@@ -799,18 +800,17 @@ class Scanner:
 
     def _type_at(self, at: int) -> tuple[str, int]:
         """Return the type of an object that starts at an offset, and its end; empty without one."""
-        name = ""
+        parts = []
         while True:
             kind, token, _, end, _ = self._next(at)
             if kind != "name":
                 return "", at
-            name += token
+            parts.append(token)
             _, token, _, at, _ = self._next(end)
-            if token == "{" and name not in _NOT_TYPES:
-                return name, end
+            if token == "{" and (len(parts) > 1 or parts[0] not in _NOT_TYPES):
+                return ".".join(parts), end
             if token != ".":
                 return "", at
-            name += "."
 
     def _value(self, stack: list[Object | Member], member: Member, at: int) -> int:
         at = self._skip(at)[0]
