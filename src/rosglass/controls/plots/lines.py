@@ -113,7 +113,11 @@ class PlotLines(QtQuick.QQuickItem):
             self._is_changed = True
         if self._is_changed:
             option = QtQuick.QQuickWindow.CreateTextureOption.TextureIsOpaque
-            self._node.setTexture(window.createTextureFromImage(_image(raster), option))
+            image = _image(raster)
+            if QtCore.QThread.currentThread() != self.thread():
+                # It is uploaded by the render thread later, when this one may draw or resize.
+                image = image.copy()
+            self._node.setTexture(window.createTextureFromImage(image, option))
             self._is_changed = False
         size = QtCore.QSizeF(raster.width / self._ratio, raster.height / self._ratio)
         self._node.setRect(QtCore.QRectF(QtCore.QPointF(0, 0), size))
