@@ -89,6 +89,14 @@ def test_a_misfit_is_said_at_its_field_and_there_is_no_message(form: Form, contr
     assert form.fields()["pose"]["position"]["x"] == 3
 
 
+@pytest.mark.parametrize("text", ["24.1", "1e-30", "0.3333333", "3.4e+38", "inf", "nan", "-0.0"])
+def test_numbers_of_float32_are_shown_as_entered(form: Form, text: str) -> None:
+    form.show("std_msgs/msg/Float32")
+    assert form.model.setText("data", text)
+    shown = form.row("data", "text")
+    assert shown == text or float(shown) == pytest.approx(float(text), rel=1e-7)
+
+
 @pytest.mark.parametrize(
     ("kind", "field", "text", "expected"),
     [

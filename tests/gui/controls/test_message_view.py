@@ -182,6 +182,16 @@ def test_received_messages_do_not_disturb_editing(controls: Any, wait: Any) -> N
     assert tree_rows(controls, "key") == []
 
 
+def test_edited_number_of_float32_is_shown(controls: Any, wait: Any) -> None:
+    show(controls, wait, "/scan", SCAN, range_max=30.5)
+    push(controls, "edit")
+    controls.find("tree").activated.emit("range_max")
+    field = controls.find("value")
+    field.setProperty("text", "24.1")
+    key(controls, "Return")
+    assert dict(tree_rows(controls, "key", "value"))["range_max"] == "24.1"
+
+
 @pytest.mark.parametrize(
     "text", ["x" * 1000, "two\nlines", "y" * 30_000], ids=["long", "lines", "huge"]
 )

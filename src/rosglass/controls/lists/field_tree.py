@@ -209,8 +209,10 @@ def number_text(item: TreeItem, value: Any) -> str:
         return "true" if value else "false"
     if number is None or number.name != "float32" or not math.isfinite(value):
         return str(value)
+    # A value that was entered is not rounded to the type yet.
+    rounded = _FLOAT.pack(value)
     texts = (f"{value:.{digits}g}" for digits in range(6, 10))
-    return next((text for text in texts if _FLOAT.unpack(_FLOAT.pack(float(text)))[0] == value), "")
+    return next((text for text in texts if _FLOAT.pack(float(text)) == rounded), str(value))
 
 
 def entered_value(text: str, item: TreeItem) -> Any:
