@@ -24,6 +24,8 @@ PARTNERS = {
     "figure5": "paper/humanoid.py",
     "geo_map": "controls/gps.py",
 }
+#: Partners that run with their example alone: controls find topics by type, and would show these.
+FLEETS = {"robot_tiles": "controls/fleet.py"}
 #: Seconds until an example shows what it is about, where it is more than usual.
 AFTER = {"replay": 12, "image_publisher": 8, "camera": 8, "geo_map": 8}
 ROSGLASS = [sys.executable, "-m", "rosglass.cli"]
@@ -70,7 +72,14 @@ def main(names: list[str]) -> None:
                 program = [sys.executable, "-c", WITH_GAMEPAD]
                 program = program if file.stem == "gamepad" else ROSGLASS
                 command = [*program, "run", str(file), "--url", router.url, *picture]
+                fleet = []
+                if file.stem in FLEETS:
+                    path = str(EXAMPLES / FLEETS[file.stem])
+                    fleet.append(subprocess.Popen([sys.executable, path, router.url]))
+                    partners += fleet
                 subprocess.run(command, check=True, cwd=ROOT)
+                for partner in fleet:
+                    partner.kill()
                 shrink(target)
         finally:
             for partner in partners:

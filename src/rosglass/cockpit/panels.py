@@ -63,7 +63,7 @@ _GROUP_OF = {
         "Lists": "AlarmList DiagnosticsView LogView TopicTree MessageView NodeGraph TfTree",
         "Call": "ServiceButton ActionPanel ParameterForm PublishPanel CallPanel",
         "Record": "Recorder Timeline",
-        "Robots": "RobotSwitch",
+        "Robots": "RobotSwitch RobotTiles",
     }.items()
     for name in names.split()
 }

@@ -26,7 +26,8 @@ __all__ = ["TrustedLayouts", "senders"]
 _RECEIVERS = frozenset(
     {"Cockpit", "Page", "Split", "Tabs", "Panel", "PanelWindow", "AlarmList", "Attitude", "Battery"}
     | {"CameraGrid", "CameraView", "Compass", "DiagnosticsView", "Gauge", "GeoMap", "JointView"}
-    | {"Lamp", "LogView", "NodeGraph", "Plot", "PlotSeries", "Speed", "TfTree", "WhoSteers"}
+    | {"Lamp", "LogView", "NodeGraph", "Plot", "PlotSeries", "RobotSwitch", "RobotTiles", "Speed"}
+    | {"TfTree", "WhoSteers"}
 )
 #: Modules whose types are known; by any other one, the same name may be another type.
 _KNOWN_MODULES = frozenset({"QtQuick", "QtQml", "Ros2", "Ros", "RosControls", "RosCockpit"})

@@ -295,3 +295,26 @@ def test_a_framed_control_leaves_title_and_status_to_its_panel(layouts: Any) -> 
     # A tab that is not shown says it, too.
     assert not layouts.find("tab0").property("wrong")
     assert layouts.find("tab1").property("wrong")
+
+
+@pytest.mark.parametrize("ns", ['"/bert"', "robots.selected"])
+def test_a_tile_leads_to_the_page_of_its_robot(layouts: Any, ns: str) -> None:
+    layouts.show(
+        f"""Page {{ Panel {{ RobotTiles {{
+            id: robots; objectName: "tiles"; namespaces: ["/anna", "/bert"] }} }} }}
+        Page {{ ns: "/anna"; {panel("a")} }}
+        Page {{ ns: {ns}; {panel("b")} }}"""
+    )
+    tiles = layouts.find("tiles")
+    cockpit = tiles.property("shell_").property("cockpit_")
+    tiles.choose_(1)
+    assert tiles.property("selected") == "/bert"
+    assert cockpit.property("pageIndex") == 2
+    cockpit.showPage(0)
+    tiles.choose_(0)
+    assert cockpit.property("pageIndex") == 1
+    # While the layout is edited, pages stay.
+    cockpit.showPage(0)
+    cockpit.setProperty("editing", True)
+    tiles.choose_(1)
+    assert cockpit.property("pageIndex") == 0

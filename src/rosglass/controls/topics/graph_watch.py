@@ -1,5 +1,5 @@
 """The ROS graph for controls: the element ``GraphWatch``, and the base of elements that show it."""
-# ruff: noqa: N815 - the names of slots and signals are QML's
+# ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
 
@@ -70,6 +70,33 @@ class GraphWatch(Element):
             )
         except Error:  # the node has just been closed
             return []
+
+    @Slot("QStringList", "QStringList", result="QVariantMap")
+    def topicsWithin(self, namespaces: list[str], types: list[str]) -> dict[str, list[str]]:
+        """Return the topics of some types by namespace, each in alphabetical order.
+
+        A topic belongs to the innermost of the namespaces: ``/arm/state`` to ``/arm``, not to
+        ``/``. Namespaces without such topics are left out.
+
+        Args:
+            namespaces: Absolute ones, such as ``/arm``.
+            types: Names such as ``sensor_msgs/msg/Imu``.
+        """
+        node, wanted, known = self.node, {*types}, {*namespaces}
+        found: dict[str, list[str]] = {}
+        try:
+            topics = node.topics() if node is not None else {}
+        except Error:  # the node has just been closed
+            return {}
+        for name in sorted(topics):
+            if wanted.isdisjoint(topics[name]):
+                continue
+            inside = name.rpartition("/")[0]
+            while inside and inside not in known:
+                inside = inside.rpartition("/")[0]
+            if (inside or "/") in known:
+                found.setdefault(inside or "/", []).append(name)
+        return found
 
     def _update(self) -> None:
         super()._update()

@@ -45,7 +45,15 @@ _IMPORTED_BY = {
         *("ActionPanel", "AlarmList", "Attitude", "Battery", "CameraGrid", "CameraView", "Compass"),
         *("DiagnosticsView", "DriveKeys", "DriveStick", "EmergencyStop", "Gamepad", "GamepadView"),
         *("Gauge", "GeoMap", "JointView", "LiveFrame", "LogView", "MapView", "MessageView"),
-        *("ModeSwitch", "NodeGraph", "ParameterForm", "Plot", "Recorder", "RobotSwitch"),
+        *(
+            "ModeSwitch",
+            "NodeGraph",
+            "ParameterForm",
+            "Plot",
+            "Recorder",
+            "RobotSwitch",
+            "RobotTiles",
+        ),
         *("ServiceButton", "Speed", "TfTree", "Timeline", "TopicTree", "TwistCommand", "WhoSteers"),
     },
 }

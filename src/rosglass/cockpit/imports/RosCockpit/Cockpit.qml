@@ -83,6 +83,14 @@ Item {
         pageIndex = index
     }
 
+    // Shows the page of a robot: the first one with its namespace as `ns`. Returns whether there is one.
+    function showRobot(ns) {
+        const index = pages.findIndex(one => one.ns !== "" && one.ns === ns)
+        if (index >= 0)
+            showPage(index)
+        return index >= 0
+    }
+
     // Lets a panel fill its page or window; null restores what is maximised.
     function maximize(panel) {
         if (panel === maximized_)

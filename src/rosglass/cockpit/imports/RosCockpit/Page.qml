@@ -9,6 +9,8 @@ Split {
     element_: "page"
     // Its name on the bar.
     property string title
+    // Namespace of the robot that it is about; empty if it is not about one.
+    property string ns
     readonly property bool isShown_: !cockpit_ || cockpit_.page === page
 
     anchors { fill: parent; margins: spacing }

@@ -112,6 +112,12 @@ Item {
         made.destroy()
     }
 
+    // A robot was chosen in the panel: its page is shown, if there is one.
+    function showRobot_(ns) {
+        if (cockpit_ && !cockpit_.editing)
+            cockpit_.showRobot(ns)
+    }
+
     function openMenu() {
         menu.active = true
         menu.item.open()
