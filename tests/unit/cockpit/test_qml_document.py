@@ -422,12 +422,6 @@ class TestHostileText:
         with pytest.raises(QmlSyntaxError, match="expected"):
             Document(text)
 
-    def test_many_objects_on_one_line(self) -> None:
-        # Minutes, if the start of the line was looked for at each.
-        document = Document("Item { " + "A { b: 1 } " * 60_000 + "}")
-        last = document.root.objects[-1]
-        assert document.at(last.path) is last
-
     @pytest.mark.parametrize(
         "text",
         [
