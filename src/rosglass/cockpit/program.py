@@ -683,33 +683,32 @@ class CockpitProgram(QtCore.QObject):
 
     def _commands(self) -> dict[str, tuple[_Command, Callable[[], object]]]:
         """Return the commands by name; those of panels and pages are added by :meth:`commands`."""
-        shows = self.tr
         return {
-            "palette": (_Command(shows("Commands"), "Ctrl+P"), lambda: None),
+            "palette": (_Command(self.tr("Commands"), "Ctrl+P"), lambda: None),
             "home": (
-                _Command(shows("Start page: robots and layouts"), "Ctrl+H"),
+                _Command(self.tr("Start page: robots and layouts"), "Ctrl+H"),
                 self._toggle_home,
             ),
-            "new": (_Command(shows("New layout"), "Ctrl+N"), self._new),
-            "open": (_Command(shows("Open a layout"), "Ctrl+O", asks=True), lambda: None),
-            "save": (_Command(shows("Save the layout"), "Ctrl+S", "layout"), lambda: self.save("")),
+            "new": (_Command(self.tr("New layout"), "Ctrl+N"), self._new),
+            "open": (_Command(self.tr("Open a layout"), "Ctrl+O", asks=True), lambda: None),
+            "save": (_Command(self.tr("Save the layout"), "Ctrl+S", "layout"), lambda: self.save("")),
             "save as": (
-                _Command(shows("Save the layout as …"), "Ctrl+Shift+S", "layout", True),
+                _Command(self.tr("Save the layout as …"), "Ctrl+Shift+S", "layout", True),
                 lambda: None,
             ),
             "edit": (
-                _Command(shows("Edit the layout, or use it"), "F4", "layout"),
+                _Command(self.tr("Edit the layout, or use it"), "F4", "layout"),
                 self._toggle_edit,
             ),
-            "undo": (_Command(shows("Undo"), "Ctrl+Z", "layout"), self.undo),
-            "redo": (_Command(shows("Redo"), "Ctrl+Shift+Z", "layout"), self.redo),
-            "remove": (_Command(shows("Remove the selected panel"), "", "layout"), self._remove),
-            "add page": (_Command(shows("Add a page"), "", "layout"), self._add_page),
-            "add all": (_Command(shows("New layout of what the robot offers")), self.addAll),
-            "search": (_Command(shows("Search robots")), self.searchRobots),
-            "tour": (_Command(shows("Try it on a simulated robot")), self.startTour),
-            "open recording": (_Command(shows("Open a recording"), asks=True), lambda: None),
-            "help": (_Command(shows("Help")), lambda: self.help("")),
+            "undo": (_Command(self.tr("Undo"), "Ctrl+Z", "layout"), self.undo),
+            "redo": (_Command(self.tr("Redo"), "Ctrl+Shift+Z", "layout"), self.redo),
+            "remove": (_Command(self.tr("Remove the selected panel"), "", "layout"), self._remove),
+            "add page": (_Command(self.tr("Add a page"), "", "layout"), self._add_page),
+            "add all": (_Command(self.tr("New layout of what the robot offers")), self.addAll),
+            "search": (_Command(self.tr("Search robots")), self.searchRobots),
+            "tour": (_Command(self.tr("Try it on a simulated robot")), self.startTour),
+            "open recording": (_Command(self.tr("Open a recording"), asks=True), lambda: None),
+            "help": (_Command(self.tr("Help")), lambda: self.help("")),
         }
 
     @Slot(str, result="QVariantList")

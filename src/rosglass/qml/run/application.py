@@ -11,6 +11,7 @@ from rosglass.comm import Handle
 from rosglass.comm.log import warn_on_terminal
 from rosglass.errors import Error
 from rosglass.qml.elements.image_sinks import is_loading
+from rosglass.qml.engine.language import translate_qt
 from rosglass.qml.engine.log import LocationFormatter
 from rosglass.qml.engine.process import (
     QuitOnSignal,
@@ -273,6 +274,7 @@ def _qt_application(file: Path, arguments: Sequence[str]) -> QtGui.QGuiApplicati
     kind: Any = QtGui.QGuiApplication if widgets is None else widgets.QApplication
     app: QtGui.QGuiApplication = kind([str(file), *arguments])
     connected()
+    translate_qt()
     app.setApplicationName(file.stem)
     app.setApplicationDisplayName(file.stem)
     return app

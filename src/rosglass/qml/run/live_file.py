@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.errors import Error, QmlError
+from rosglass.qml.engine.language import translate_texts
 from rosglass.qml.engine.log import forget_repeats, log_engine_warnings
 from rosglass.qml.engine.watchdog import Watchdog
 from rosglass.qml.run.load_errors import error_list
@@ -326,6 +327,7 @@ class LiveFile(QtCore.QObject):
         job(self.engine)
 
     def _new_engine(self) -> QtQml.QQmlEngine:
+        translate_texts()
         engine = QtQml.QQmlEngine()
         log_engine_warnings(engine)
         # The engine searches the last path first: our own modules are added last.
