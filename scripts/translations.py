@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""Update the translations: ``src/rosglass/translations/rosglass_*.ts``, and the ``.qm`` files made of them.
+"""Update the translations: ``src/rosglass/translations/rosglass_*.ts``, and ``.qm`` made of them.
 
-With ``--write`` it writes the files: new texts come in as unfinished, those that are gone go out. Without, it
-prints what is missing. A new language: ``scripts/translations.py --write --add fr``. Run it with PySide6.
+With ``--write`` it writes the files: new texts come in as unfinished, those that are gone go out.
+Without, it prints what is missing. A new language: ``--write --add fr``. Run it with PySide6.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import shutil
 import subprocess
@@ -17,6 +18,8 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import NamedTuple
 
+from rosglass.cockpit.first_layout import words_of
+from rosglass.cockpit.panels import GROUPS, controls
 from rosglass.qml.engine.language import FOLDER
 
 SOURCES = Path(__file__).parents[1] / "src" / "rosglass"
@@ -62,17 +65,37 @@ def problems(file: Path) -> list[str]:
     return found
 
 
-def update(file: Path) -> None:
-    """Bring a ``.ts`` file to the texts of the sources; what is translated stays."""
+def catalogue_texts() -> list[str]:
+    """Return the texts of the cockpit's catalogue, which come from headings of QML files."""
+    names = [words_of(one.name) for one in controls()]
+    return list(dict.fromkeys([*GROUPS, *names, *(one.line for one in controls())]))
+
+
+def updated(old: Path, folder: Path) -> Path:
+    """Return a ``.ts`` file with the texts of the sources; what is translated stays.
+
+    Args:
+        old: The file so far; a language is added if there is none.
+        folder: Where the new one is written.
+    """
+    file = folder / old.name
+    if old.exists():
+        shutil.copy(old, file)
+    catalogue = file.with_name("Catalogue.js")
+    catalogue.write_text(
+        "".join(f"qsTranslate('Catalogue', {json.dumps(one)})\n" for one in catalogue_texts())
+    )
     _run(
-        "pyside6-lupdate", "-silent", "-extensions", "qml,js,py", "-no-obsolete", "-locations", "none",
+        "pyside6-lupdate", "-silent", "-extensions", "qml,js,py", "-no-obsolete",
+        "-locations", "none",
         "-source-language", "en", "-target-language", file.stem.partition("_")[2],
-        str(SOURCES), "-ts", str(file),
+        str(SOURCES), str(catalogue), "-ts", str(file),
     )  # fmt: skip
     # Comments on attributes of classes, which it takes for those of the next text.
     text = file.read_text(encoding="utf-8")
     text = re.sub(r"\s*<extracomment>.*?</extracomment>", "", text, flags=re.DOTALL)
     file.write_text(text, encoding="utf-8")
+    return file
 
 
 def compiled(file: Path, folder: Path) -> Path:
@@ -104,10 +127,7 @@ def main() -> int:
     missing = []
     for file in wanted:
         with tempfile.TemporaryDirectory() as name:
-            new = Path(name) / file.name
-            if file.exists():
-                shutil.copy(file, new)
-            update(new)
+            new = updated(file, Path(name))
             if args.write:
                 shutil.copy(new, file)
                 compiled(file, FOLDER)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 # No test uses the developer's own cache of types, nor leaves anything there; the
 # processes that tests start inherit this.
 os.environ["ROSGLASS_TYPE_CACHE"] = "off"
+# Tests read English texts, whatever the developer speaks.
+os.environ["ROSGLASS_LANGUAGE"] = "en"
 
 #: ROS domains for tests: above 101 the ports are among those that Linux gives to anybody.
 DOMAINS, DOMAIN_SHARES = 100, 8

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rosglass.cockpit.qml_values import to_qml
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from rosglass.cockpit.panels import Panel, Proposal
 
@@ -58,19 +58,28 @@ def _file(title: str, content: str, modules: Iterable[str]) -> str:
     return f"{head}\n{_container('Cockpit', [f'{titled}{page}'])}\n"
 
 
-def first_layout(proposals: Sequence[Proposal], title: str = "Robot") -> str:
+def first_layout(
+    proposals: Sequence[Proposal],
+    title: str = "Robot",
+    title_of: Callable[[str], str] | None = None,
+) -> str:
     """Return a layout of one page with all proposed panels.
 
     Cameras and maps have the room on the left, what is steered and watched is beside them in a
     column, and lists share a place as tabs.
+
+    Args:
+        proposals: The panels, best first.
+        title: Title of the layout and its page.
+        title_of: Returns the title of a panel from the name of its type; by default, its words.
     """
     if not proposals:
         return empty_layout(title)
     modules = {module for one in proposals for module in one.panel.imports}
-    return _file(title, _arranged(proposals), modules)
+    return _file(title, _arranged(proposals, title_of or words_of), modules)
 
 
-def _arranged(proposals: Sequence[Proposal]) -> str:
+def _arranged(proposals: Sequence[Proposal], title_of: Callable[[str], str]) -> str:
     large, column, tabbed = [], [], []
     for one in proposals:
         if one.panel.group in _LARGE_GROUPS and _is_large(one.panel):
@@ -79,9 +88,9 @@ def _arranged(proposals: Sequence[Proposal]) -> str:
             tabbed.append(one)
         else:
             column.append(one)
-    left = _stack([_text(one) for one in large])
-    places = [_text(one) for one in column[: _MAX_COLUMN - 1]]
-    rest = [_text(one) for one in (*column[_MAX_COLUMN - 1 :], *tabbed)]
+    left = _stack([_text(one, title_of) for one in large])
+    places = [_text(one, title_of) for one in column[: _MAX_COLUMN - 1]]
+    rest = [_text(one, title_of) for one in (*column[_MAX_COLUMN - 1 :], *tabbed)]
     if rest:
         places.append(_tabs(rest))
     right = _stack(places)
@@ -94,8 +103,8 @@ def _is_large(panel: Panel) -> bool:
     return panel.name not in ("Compass", "Attitude")
 
 
-def _text(proposal: Proposal) -> str:
-    title = words_of(proposal.panel.name)
+def _text(proposal: Proposal, title_of: Callable[[str], str]) -> str:
+    title = title_of(proposal.panel.name)
     if proposal.topic and proposal.panel.group == "See":
         title = proposal.topic.strip("/").split("/")[0] or title
     return panel_text(proposal.panel, proposal.snippet, title)

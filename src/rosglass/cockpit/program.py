@@ -240,7 +240,9 @@ class CockpitProgram(QtCore.QObject):
     def _propose(self, robot: FoundRobot) -> None:
         usable = [one for one in self._panels if not one.problem]
         self._proposed = propose(robot.topics, usable)
-        rows = [{"title": words_of(one.panel.name), "reason": one.reason} for one in self._proposed]
+        rows = [
+            {"title": _title_of(one.panel.name), "reason": one.reason} for one in self._proposed
+        ]
         report(self, proposals=rows)
         self._list_catalogue()
 
@@ -289,8 +291,11 @@ class CockpitProgram(QtCore.QObject):
 
     def _list_catalogue(self) -> None:
         fitting = {one.panel.name for one in self._proposed}
-        lines = [one.line for one in self._panels]
-        found = search(self._wanted, [one.name for one in self._panels], lines)
+        lines = [_translated(one.line) for one in self._panels]
+        names = [
+            f"{one.name} {title}" for one, title in zip(self._panels, self._titles, strict=True)
+        ]
+        found = search(self._wanted, names, lines)
         if not self._wanted:
             found = sorted(found, key=lambda at: self._panels[at].name not in fitting)
         report(
@@ -299,9 +304,9 @@ class CockpitProgram(QtCore.QObject):
                 {
                     "index": at,
                     "title": self._titles[at],
-                    "line": self._panels[at].problem or self._panels[at].line,
+                    "line": self._panels[at].problem or lines[at],
                     "icon": self._panels[at].icon,
-                    "group": self._panels[at].group,
+                    "group": _translated(self._panels[at].group),
                     "fits": self._panels[at].name in fitting,
                 }
                 for at in found
@@ -324,7 +329,7 @@ class CockpitProgram(QtCore.QObject):
     @Slot()
     def addAll(self) -> None:
         """Show all proposed panels in a new layout."""
-        self._start(first_layout(self._proposed, self.tr("Robot")), self.tr("Robot"))
+        self._start(first_layout(self._proposed, self.tr("Robot"), _title_of), self.tr("Robot"))
 
     # -- what is remembered ----------------------------------------------------------------------
 
@@ -381,7 +386,9 @@ class CockpitProgram(QtCore.QObject):
                 else one
                 for one in self._panels
             ]
-            self._list_catalogue()
+        # Only now there is a Qt application, with its language.
+        self._titles = [_translated(one) for one in self._titles]
+        self._list_catalogue()
         self._timer.start()
         self._look()
         if self._to_open is not None:
@@ -691,7 +698,10 @@ class CockpitProgram(QtCore.QObject):
             ),
             "new": (_Command(self.tr("New layout"), "Ctrl+N"), self._new),
             "open": (_Command(self.tr("Open a layout"), "Ctrl+O", asks=True), lambda: None),
-            "save": (_Command(self.tr("Save the layout"), "Ctrl+S", "layout"), lambda: self.save("")),
+            "save": (
+                _Command(self.tr("Save the layout"), "Ctrl+S", "layout"),
+                lambda: self.save(""),
+            ),
             "save as": (
                 _Command(self.tr("Save the layout as …"), "Ctrl+Shift+S", "layout", True),
                 lambda: None,
@@ -983,6 +993,16 @@ def _plugin_panel(plugin: RqmlPlugin) -> Panel:
         imports=("RosCockpit 1.0",),
         page="cockpit.html",
     )
+
+
+def _translated(text: str) -> str:
+    """Return a text of the catalogue, which is read from QML files, in the user's language."""
+    return str(QtCore.QCoreApplication.translate("Catalogue", text))
+
+
+def _title_of(name: str) -> str:
+    """Return the name of a type as words, in the user's language."""
+    return _translated(words_of(name))
 
 
 def _is_wide(item: Any) -> bool:

@@ -84,14 +84,6 @@
         <translation>die Felder des Ziels sind noch nicht bekannt</translation>
     </message>
     <message>
-        <source>%1 %2</source>
-        <translation>%1 %2</translation>
-    </message>
-    <message>
-        <source>the type %1 is unknown here: set `goal`</source>
-        <translation>der Typ %1 ist hier unbekannt: `goal` setzen</translation>
-    </message>
-    <message>
         <source>the action was changed before the goal ended</source>
         <translation>die Action wurde gewechselt, bevor das Ziel beendet war</translation>
     </message>
@@ -102,10 +94,6 @@
     <message>
         <source>NOT CANCELLED: %1</source>
         <translation>NICHT ABGEBROCHEN: %1</translation>
-    </message>
-    <message>
-        <source>%1 more fields have their defaults</source>
-        <translation>%1 weitere Felder mit Vorgabewerten</translation>
     </message>
     <message>
         <source>Cancel</source>
@@ -443,22 +431,333 @@
     </message>
 </context>
 <context>
+    <name>Catalogue</name>
+    <message>
+        <source>Drive</source>
+        <translation>Fahren</translation>
+    </message>
+    <message>
+        <source>See</source>
+        <translation>Sehen</translation>
+    </message>
+    <message>
+        <source>Map</source>
+        <translation>Karte</translation>
+    </message>
+    <message>
+        <source>Plot</source>
+        <translation>Plot</translation>
+    </message>
+    <message>
+        <source>State</source>
+        <translation>Zustand</translation>
+    </message>
+    <message>
+        <source>Lists</source>
+        <translation>Listen</translation>
+    </message>
+    <message>
+        <source>Call</source>
+        <translation>Aufruf</translation>
+    </message>
+    <message>
+        <source>Record</source>
+        <translation>Aufnahme</translation>
+    </message>
+    <message>
+        <source>Robots</source>
+        <translation>Roboter</translation>
+    </message>
+    <message>
+        <source>Own</source>
+        <translation>Eigene</translation>
+    </message>
+    <message>
+        <source>Drive keys</source>
+        <translation>Fahrtasten</translation>
+    </message>
+    <message>
+        <source>Drive stick</source>
+        <translation>Fahrhebel</translation>
+    </message>
+    <message>
+        <source>Emergency stop</source>
+        <translation>Not-Halt</translation>
+    </message>
+    <message>
+        <source>Gamepad view</source>
+        <translation>Gamepad</translation>
+    </message>
+    <message>
+        <source>Mode switch</source>
+        <translation>Modus</translation>
+    </message>
+    <message>
+        <source>Speed</source>
+        <translation>Tempo</translation>
+    </message>
+    <message>
+        <source>Who steers</source>
+        <translation>Wer steuert</translation>
+    </message>
+    <message>
+        <source>Camera grid</source>
+        <translation>Kameras</translation>
+    </message>
+    <message>
+        <source>Camera view</source>
+        <translation>Kamera</translation>
+    </message>
+    <message>
+        <source>Attitude</source>
+        <translation>Lage</translation>
+    </message>
+    <message>
+        <source>Compass</source>
+        <translation>Kompass</translation>
+    </message>
+    <message>
+        <source>Geo map</source>
+        <translation>Geokarte</translation>
+    </message>
+    <message>
+        <source>Map view</source>
+        <translation>Karte</translation>
+    </message>
+    <message>
+        <source>Scene view</source>
+        <translation>3D-Ansicht</translation>
+    </message>
+    <message>
+        <source>Gauge</source>
+        <translation>Anzeige</translation>
+    </message>
+    <message>
+        <source>Battery</source>
+        <translation>Batterie</translation>
+    </message>
+    <message>
+        <source>Joint view</source>
+        <translation>Gelenke</translation>
+    </message>
+    <message>
+        <source>Lamp</source>
+        <translation>Lampe</translation>
+    </message>
+    <message>
+        <source>Alarm list</source>
+        <translation>Alarme</translation>
+    </message>
+    <message>
+        <source>Diagnostics view</source>
+        <translation>Diagnose</translation>
+    </message>
+    <message>
+        <source>Log view</source>
+        <translation>Log</translation>
+    </message>
+    <message>
+        <source>Message view</source>
+        <translation>Nachricht</translation>
+    </message>
+    <message>
+        <source>Node graph</source>
+        <translation>Knotengraph</translation>
+    </message>
+    <message>
+        <source>Tf tree</source>
+        <translation>TF-Baum</translation>
+    </message>
+    <message>
+        <source>Topic tree</source>
+        <translation>Topics</translation>
+    </message>
+    <message>
+        <source>Action panel</source>
+        <translation>Action</translation>
+    </message>
+    <message>
+        <source>Call panel</source>
+        <translation>Dienstaufruf</translation>
+    </message>
+    <message>
+        <source>Parameter form</source>
+        <translation>Parameter</translation>
+    </message>
+    <message>
+        <source>Publish panel</source>
+        <translation>Senden</translation>
+    </message>
+    <message>
+        <source>Service button</source>
+        <translation>Dienst-Taste</translation>
+    </message>
+    <message>
+        <source>Recorder</source>
+        <translation>Aufnahme</translation>
+    </message>
+    <message>
+        <source>Timeline</source>
+        <translation>Zeitleiste</translation>
+    </message>
+    <message>
+        <source>Robot switch</source>
+        <translation>Roboterwahl</translation>
+    </message>
+    <message>
+        <source>Steers a robot by keys that are held down, wherever the focus in the window is, except in a text field.</source>
+        <translation>Steuert einen Roboter mit gehaltenen Tasten, gleich wo der Fokus im Fenster ist, außer in Textfeldern.</translation>
+    </message>
+    <message>
+        <source>A stick to steer a robot with, for mouse, fingers, and the arrow keys.</source>
+        <translation>Ein Hebel zum Steuern, für Maus, Finger und Pfeiltasten.</translation>
+    </message>
+    <message>
+        <source>The emergency stop: latched, and it shows what the robot confirms, not what was clicked.</source>
+        <translation>Der Not-Halt: rastet ein und zeigt, was der Roboter bestätigt, nicht, was geklickt wurde.</translation>
+    </message>
+    <message>
+        <source>A gamepad&apos;s axes and buttons, live and by name; and a choice where there are several.</source>
+        <translation>Achsen und Tasten eines Gamepads, live und mit Namen; bei mehreren mit Auswahl.</translation>
+    </message>
+    <message>
+        <source>The robot&apos;s mode: shows the one that the robot confirms, and requests another; by topics (std_msgs/String or an integer), or of a ROS 2 lifecycle node.</source>
+        <translation>Der Modus des Roboters: zeigt den bestätigten und fordert einen anderen an; über Topics (std_msgs/String oder Ganzzahl) oder von einem Lifecycle-Knoten von ROS 2.</translation>
+    </message>
+    <message>
+        <source>How fast the robot drives and turns, from nav_msgs/Odometry or a Twist; and why it does not.</source>
+        <translation>Wie schnell der Roboter fährt und dreht, aus nav_msgs/Odometry oder Twist; und warum nicht.</translation>
+    </message>
+    <message>
+        <source>Who else may steer the robot: other publishers of its command topics, nodes of the same name, and the locks of its multiplexer; in words.</source>
+        <translation>Wer den Roboter noch steuern kann: andere Publisher der Befehls-Topics, Knoten gleichen Namens und Sperren des Multiplexers; in Worten.</translation>
+    </message>
+    <message>
+        <source>Several cameras side by side; a click or the keyboard makes one of them big.</source>
+        <translation>Mehrere Kameras nebeneinander; Klick oder Tastatur vergrößert eine.</translation>
+    </message>
+    <message>
+        <source>A camera&apos;s image.</source>
+        <translation>Das Bild einer Kamera.</translation>
+    </message>
+    <message>
+        <source>Artificial horizon: how the robot leans, from sensor_msgs/Imu or nav_msgs/Odometry.</source>
+        <translation>Künstlicher Horizont: wie der Roboter sich neigt, aus sensor_msgs/Imu oder nav_msgs/Odometry.</translation>
+    </message>
+    <message>
+        <source>The heading, from sensor_msgs/Imu or nav_msgs/Odometry, and what it is measured from.</source>
+        <translation>Der Kurs, aus sensor_msgs/Imu oder nav_msgs/Odometry, und worauf er sich bezieht.</translation>
+    </message>
+    <message>
+        <source>Where a robot with a satellite receiver is, on map tiles from this machine&apos;s disk; nothing is downloaded.</source>
+        <translation>Wo ein Roboter mit Satellitenempfänger ist, auf Kartenkacheln dieses Rechners; nichts wird heruntergeladen.</translation>
+    </message>
+    <message>
+        <source>The map with costmaps, the robot, its track, scans, paths and particles; goals, waypoints and the robot&apos;s pose are set by dragging.</source>
+        <translation>Die Karte mit Costmaps, Roboter, Spur, Scans, Pfaden und Partikeln; Ziele, Wegpunkte und die Pose werden durch Ziehen gesetzt.</translation>
+    </message>
+    <message>
+        <source>The robot in 3D: displays as in RViz.</source>
+        <translation>Der Roboter in 3D: Displays wie in RViz.</translation>
+    </message>
+    <message>
+        <source>A number of any topic on a dial or a bar, with thresholds.</source>
+        <translation>Eine Zahl eines beliebigen Topics als Zeiger oder Balken, mit Schwellen.</translation>
+    </message>
+    <message>
+        <source>Numbers of any topics over time, or one against another, with every sample kept.</source>
+        <translation>Zahlen beliebiger Topics über der Zeit oder gegeneinander, ohne Verlust von Werten.</translation>
+    </message>
+    <message>
+        <source>How much is left in a battery, and for how long, of sensor_msgs/BatteryState.</source>
+        <translation>Wie voll eine Batterie ist und wie lange sie reicht, aus sensor_msgs/BatteryState.</translation>
+    </message>
+    <message>
+        <source>The joints of a robot and how near they are to their limits, of sensor_msgs/JointState and URDF.</source>
+        <translation>Die Gelenke und wie nah sie am Anschlag sind, aus sensor_msgs/JointState und URDF.</translation>
+    </message>
+    <message>
+        <source>A lamp for a boolean of any topic, or for a number beyond a threshold; lit, dark or unknown, in words as well.</source>
+        <translation>Eine Lampe für einen Wahrheitswert oder eine Zahl über einer Schwelle; ein, aus oder unbekannt, auch in Worten.</translation>
+    </message>
+    <message>
+        <source>Alarms of diagnostic_msgs/DiagnosticArray and std_msgs/Bool, which stay until they are acknowledged.</source>
+        <translation>Alarme aus diagnostic_msgs/DiagnosticArray und std_msgs/Bool, die bis zum Quittieren bleiben.</translation>
+    </message>
+    <message>
+        <source>What the parts of a robot report about themselves, of diagnostic_msgs/DiagnosticArray.</source>
+        <translation>Was die Teile eines Roboters über sich melden, aus diagnostic_msgs/DiagnosticArray.</translation>
+    </message>
+    <message>
+        <source>The log messages of all nodes, of rcl_interfaces/Log or rosgraph_msgs/Log.</source>
+        <translation>Die Log-Meldungen aller Knoten, aus rcl_interfaces/Log oder rosgraph_msgs/Log.</translation>
+    </message>
+    <message>
+        <source>The message of any topic as a tree of fields with their units; edited, it can be published.</source>
+        <translation>Die Nachricht eines Topics als Baum der Felder mit Einheiten; bearbeitet lässt sie sich senden.</translation>
+    </message>
+    <message>
+        <source>Nodes and topics of the robot as a graph: drag to move it, turn the wheel or pinch to zoom.</source>
+        <translation>Knoten und Topics als Graph: ziehen verschiebt, Rad oder zwei Finger zoomen.</translation>
+    </message>
+    <message>
+        <source>The frames of the robot as a tree, with the age and rate of each transform, and what is wrong with it.</source>
+        <translation>Die Frames als Baum, mit Alter und Rate jeder Transformation und ihren Fehlern.</translation>
+    </message>
+    <message>
+        <source>All topics of the robot as a tree, with types, publishers, subscribers, rates, and what does not match.</source>
+        <translation>Alle Topics als Baum, mit Typen, Publishern, Subscribern, Raten und Unstimmigkeiten.</translation>
+    </message>
+    <message>
+        <source>Sends goals to an action of any type: shows progress, result and why a goal was refused or lost, and cancels it.</source>
+        <translation>Sendet Ziele an eine Action beliebigen Typs: zeigt Fortschritt, Ergebnis und Gründe für Ablehnung oder Verlust, und bricht ab.</translation>
+    </message>
+    <message>
+        <source>Calls a service of any type, with a request that is filled in by hand, and shows the whole response.</source>
+        <translation>Ruft einen Dienst beliebigen Typs mit von Hand ausgefüllter Anfrage auf und zeigt die ganze Antwort.</translation>
+    </message>
+    <message>
+        <source>All parameters of a node, to show and to change: with ranges, choices, refused values and undo.</source>
+        <translation>Alle Parameter eines Knotens, zum Zeigen und Ändern: mit Bereichen, Auswahl, abgelehnten Werten und Rückgängig.</translation>
+    </message>
+    <message>
+        <source>Publishes messages of any type on a topic, filled in by hand: once, or again and again at a rate.</source>
+        <translation>Sendet von Hand ausgefüllte Nachrichten beliebigen Typs auf einem Topic: einmal oder mit einer Rate.</translation>
+    </message>
+    <message>
+        <source>A button that calls a service of any type, and shows how the call ended.</source>
+        <translation>Eine Taste, die einen Dienst beliebigen Typs aufruft und zeigt, wie es ausging.</translation>
+    </message>
+    <message>
+        <source>Records topics to an MCAP file or a ROS 1 bag, with limits and event marks.</source>
+        <translation>Nimmt Topics in eine MCAP-Datei oder ein ROS-1-Bag auf, mit Grenzen und Marken.</translation>
+    </message>
+    <message>
+        <source>The time of a recording that an interface shows: play, pause, drag, speed, loop, and its event marks.</source>
+        <translation>Die Zeit einer Aufnahme: abspielen, Pause, ziehen, Tempo, Schleife und Marken.</translation>
+    </message>
+    <message>
+        <source>The robots of a graph, one of which is shown and steered: its namespace is `current`.</source>
+        <translation>Die Roboter eines Graphen, von denen einer gezeigt und gesteuert wird: sein Namespace ist `current`.</translation>
+    </message>
+</context>
+<context>
     <name>CatalogueBox</name>
     <message>
         <source>Panels to add</source>
-        <translation>Felder zum Hinzufügen</translation>
+        <translation>Panels zum Hinzufügen</translation>
     </message>
     <message>
         <source>Search panels</source>
-        <translation>Felder suchen</translation>
+        <translation>Panels suchen</translation>
     </message>
     <message>
         <source>Panels</source>
-        <translation>Felder</translation>
+        <translation>Panels</translation>
     </message>
     <message>
         <source>No panel has this name.</source>
-        <translation>Kein Feld heißt so.</translation>
+        <translation>Kein Panel heißt so.</translation>
     </message>
 </context>
 <context>
@@ -493,7 +792,7 @@
     </message>
     <message>
         <source>next panel, last panel</source>
-        <translation>nächstes, voriges Feld</translation>
+        <translation>nächstes, voriges Panel</translation>
     </message>
     <message>
         <source>F11</source>
@@ -501,7 +800,7 @@
     </message>
     <message>
         <source>maximise the panel, restore it</source>
-        <translation>Feld maximieren, zurücksetzen</translation>
+        <translation>Panel maximieren, wiederherstellen</translation>
     </message>
     <message>
         <source>Shift+F10</source>
@@ -509,7 +808,7 @@
     </message>
     <message>
         <source>menu of the panel</source>
-        <translation>Menü des Felds</translation>
+        <translation>Menü des Panels</translation>
     </message>
     <message>
         <source>F1</source>
@@ -517,7 +816,7 @@
     </message>
     <message>
         <source>help on the panel</source>
-        <translation>Hilfe zum Feld</translation>
+        <translation>Hilfe zum Panel</translation>
     </message>
 </context>
 <context>
@@ -640,7 +939,7 @@
     </message>
     <message>
         <source>Remove the selected panel</source>
-        <translation>Gewähltes Feld entfernen</translation>
+        <translation>Gewähltes Panel entfernen</translation>
     </message>
     <message>
         <source>Add a page</source>
@@ -668,7 +967,7 @@
     </message>
     <message>
         <source>Add panel: {}</source>
-        <translation>Feld hinzufügen: {}</translation>
+        <translation>Panel hinzufügen: {}</translation>
     </message>
     <message>
         <source>there is no command {}</source>
@@ -680,7 +979,7 @@
     </message>
     <message>
         <source>select a panel first</source>
-        <translation>zuerst ein Feld wählen</translation>
+        <translation>zuerst ein Panel wählen</translation>
     </message>
     <message>
         <source>Remove {}</source>
@@ -688,7 +987,7 @@
     </message>
     <message>
         <source>panel</source>
-        <translation>Feld</translation>
+        <translation>Panel</translation>
     </message>
     <message>
         <source>Add page</source>
@@ -2072,34 +2371,34 @@
     <name>Panel</name>
     <message>
         <source>Empty: choose what it shows from the list of panels, or drag a panel here.</source>
-        <translation>Leer: aus der Liste der Felder wählen oder ein Feld hierher ziehen.</translation>
+        <translation>Leer: aus der Liste der Panels wählen oder ein Panel hierher ziehen.</translation>
     </message>
     <message>
         <source>This panel is empty. Edit the layout to say what it shows.</source>
-        <translation>Dieses Feld ist leer. Beim Bearbeiten des Layouts den Inhalt wählen.</translation>
+        <translation>Dieses Panel ist leer. Beim Bearbeiten des Layouts den Inhalt wählen.</translation>
     </message>
 </context>
 <context>
     <name>PanelButtons</name>
     <message>
         <source>Put the panel back</source>
-        <translation>Feld andocken</translation>
+        <translation>Panel andocken</translation>
     </message>
     <message>
         <source>Show the panel in a window of its own</source>
-        <translation>Feld in eigenem Fenster zeigen</translation>
+        <translation>Panel in eigenem Fenster zeigen</translation>
     </message>
     <message>
         <source>Restore the panel (F11)</source>
-        <translation>Feld zurücksetzen (F11)</translation>
+        <translation>Panel wiederherstellen (F11)</translation>
     </message>
     <message>
         <source>Maximise the panel (F11)</source>
-        <translation>Feld maximieren (F11)</translation>
+        <translation>Panel maximieren (F11)</translation>
     </message>
     <message>
         <source>Menu of the panel (Shift+F10)</source>
-        <translation>Menü des Felds (Umschalt+F10)</translation>
+        <translation>Menü des Panels (Umschalt+F10)</translation>
     </message>
 </context>
 <context>
@@ -2367,7 +2666,7 @@
     <message>
         <source>This plugin was stopped, so that the other panels live on.
 %1</source>
-        <translation>Dieses Plugin wurde angehalten, damit die anderen Felder weiterlaufen.
+        <translation>Dieses Plugin wurde angehalten, damit die anderen Panels weiterlaufen.
 %1</translation>
     </message>
     <message>
@@ -2387,7 +2686,7 @@
     <name>PropertyBox</name>
     <message>
         <source>Title of the panel</source>
-        <translation>Titel des Felds</translation>
+        <translation>Titel des Panels</translation>
     </message>
     <message>
         <source>Remove</source>
@@ -2406,7 +2705,7 @@
     </message>
     <message>
         <source>No panel is selected</source>
-        <translation>Kein Feld gewählt</translation>
+        <translation>Kein Panel gewählt</translation>
     </message>
     <message>
         <source>Help about %1</source>
@@ -2868,7 +3167,7 @@
     </message>
     <message>
         <source>This robot offers data for %1 panels</source>
-        <translation>Dieser Roboter bietet Daten für %1 Felder</translation>
+        <translation>Dieser Roboter bietet Daten für %1 Panels</translation>
     </message>
     <message>
         <source>Show all</source>
@@ -3176,18 +3475,6 @@
     <message>
         <source>the robot is not connected</source>
         <translation>der Roboter ist nicht verbunden</translation>
-    </message>
-    <message>
-        <source>is true or false</source>
-        <translation>ist true oder false</translation>
-    </message>
-    <message>
-        <source>is not a number</source>
-        <translation>ist keine Zahl</translation>
-    </message>
-    <message>
-        <source>is not a list, such as [1, 2]</source>
-        <translation>ist keine Liste wie [1, 2]</translation>
     </message>
     <message>
         <source>it gave no reason</source>

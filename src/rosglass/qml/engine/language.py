@@ -1,7 +1,7 @@
 """The language of the texts for users: of controls, layouts, and the cockpit.
 
-Texts are English in the sources. ``translations/rosglass_de.qm`` holds the German ones; it is made of
-``rosglass_de.ts`` by ``scripts/translations.py``. A text without a translation is shown in English.
+Texts are English in the sources. ``translations/rosglass_de.qm`` holds the German ones; it is made
+of ``rosglass_de.ts`` by ``scripts/translations.py``. A text without a translation stays English.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def languages() -> list[str]:
 
 
 def chosen_language() -> str:
-    """Return the language of ``ROSGLASS_LANGUAGE``, or else the first of the system that there is."""
+    """Return the language of ``ROSGLASS_LANGUAGE``, or else the system's first that there is."""
     there = languages()
     wanted = os.environ.get(_VARIABLE, "")
     if wanted:
@@ -45,7 +45,7 @@ def chosen_language() -> str:
 
 
 def translate_texts() -> None:
-    """Translate the texts of rosglass in the Qt application, if there is one; safe to call twice."""
+    """Translate rosglass's texts in the Qt application, if there is one; safe to call twice."""
     app = QtCore.QCoreApplication.instance()
     if app is None or app.findChild(QtCore.QTranslator, "rosglass") is not None:
         return
