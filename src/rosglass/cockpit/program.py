@@ -30,7 +30,7 @@ from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qml.engine.runtime import runtime_of
 from rosglass.qml.run.modules import locate
 from rosglass.qml.run.renderer_choice import choice
-from rosglass.qt import QtCore, Signal, Slot, is_alive
+from rosglass.qt import QtCore, QtGui, Signal, Slot, is_alive
 from rosglass.wires.zenoh.options import shown_url
 
 if TYPE_CHECKING:
@@ -725,14 +725,25 @@ class CockpitProgram(QtCore.QObject):
     def commands(self, text: str) -> list[dict[str, Any]]:
         """Return the commands that a text finds, best first; all of them for an empty one."""
         rows = [
-            {"name": name, "text": one.text, "keys": one.keys, "file": one.asks}
+            {
+                "name": name,
+                "text": one.text,
+                "keys": one.keys,
+                "shown": _shown_keys(one.keys),
+                "file": one.asks,
+            }
             for name, (one, _) in self._commands().items()
             if one.needs != "layout" or self._has_layout() or not text
         ]
         if not text:
             return rows
         rows += [
-            {"name": f"add {at}", "text": self.tr("Add panel: {}").format(title), "keys": ""}
+            {
+                "name": f"add {at}",
+                "text": self.tr("Add panel: {}").format(title),
+                "keys": "",
+                "shown": "",
+            }
             for at, title in enumerate(self._titles)
         ]
         for word in text.split():
@@ -929,7 +940,14 @@ class CockpitProgram(QtCore.QObject):
         if self.message and time.monotonic() - self._said_at > _MESSAGE_S:
             report(self, message="")
         state = session.state if session.is_initialized else ""
-        detail = f"{state}: {session.detail}" if session.detail and state != "connected" else state
+        shown = {
+            "connected": self.tr("connected"),
+            "connecting": self.tr("connecting"),
+            "lost": self.tr("connection lost"),
+            "closed": self.tr("closed"),
+            "failed": self.tr("failed"),
+        }.get(state, state)
+        detail = f"{shown}: {session.detail}" if session.detail and state != "connected" else shown
         report(
             self,
             connected=state == "connected",
@@ -998,6 +1016,11 @@ def _plugin_panel(plugin: RqmlPlugin) -> Panel:
 def _translated(text: str) -> str:
     """Return a text of the catalogue, which is read from QML files, in the user's language."""
     return str(QtCore.QCoreApplication.translate("Catalogue", text))
+
+
+def _shown_keys(keys: str) -> str:
+    """Return keys as they are written on the user's keyboard, such as ``Strg+P``."""
+    return QtGui.QKeySequence(keys).toString(QtGui.QKeySequence.SequenceFormat.NativeText)
 
 
 def _title_of(name: str) -> str:

@@ -605,6 +605,10 @@
         <translation>Roboterwahl</translation>
     </message>
     <message>
+        <source>Robot tiles</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Steers a robot by keys that are held down, wherever the focus in the window is, except in a text field.</source>
         <translation>Steuert einen Roboter mit gehaltenen Tasten, gleich wo der Fokus im Fenster ist, außer in Textfeldern.</translation>
     </message>
@@ -739,6 +743,10 @@
     <message>
         <source>The robots of a graph, one of which is shown and steered: its namespace is `current`.</source>
         <translation>Die Roboter eines Graphen, von denen einer gezeigt und gesteuert wird: sein Namespace ist `current`.</translation>
+    </message>
+    <message>
+        <source>All robots at a glance: a tile for each, with camera, battery, mode, alarms and age.</source>
+        <translation type="unfinished"></translation>
     </message>
 </context>
 <context>
@@ -998,6 +1006,14 @@
         <translation>Seite</translation>
     </message>
     <message>
+        <source>{} exists already.</source>
+        <translation>{} gibt es schon.</translation>
+    </message>
+    <message>
+        <source>Replace it</source>
+        <translation>Ersetzen</translation>
+    </message>
+    <message>
         <source>choose a file first: Ctrl+Shift+S</source>
         <translation>zuerst eine Datei wählen: Strg+Umschalt+S</translation>
     </message>
@@ -1020,6 +1036,26 @@
     <message>
         <source>Go on</source>
         <translation>Zurück</translation>
+    </message>
+    <message>
+        <source>connected</source>
+        <translation>verbunden</translation>
+    </message>
+    <message>
+        <source>connecting</source>
+        <translation>verbindet</translation>
+    </message>
+    <message>
+        <source>connection lost</source>
+        <translation>Verbindung verloren</translation>
+    </message>
+    <message>
+        <source>closed</source>
+        <translation>geschlossen</translation>
+    </message>
+    <message>
+        <source>failed</source>
+        <translation>fehlgeschlagen</translation>
     </message>
     <message>
         <source>Changes from outside</source>
@@ -2966,6 +3002,109 @@
     <message>
         <source>gone</source>
         <translation>weg</translation>
+    </message>
+</context>
+<context>
+    <name>RobotTiles</name>
+    <message>
+        <source>Robots</source>
+        <translation>Roboter</translation>
+    </message>
+    <message>
+        <source>no robot: no namespace has %1</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>1 robot</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>%1 robots</source>
+        <translation>%1 Roboter</translation>
+    </message>
+    <message>
+        <source>%1 in trouble</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>%1 not shown</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no battery</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>? %</source>
+        <translation>? %</translation>
+    </message>
+    <message>
+        <source>%1 %, OLD</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>%1 %</source>
+        <translation>%1 %</translation>
+    </message>
+    <message>
+        <source>no diagnostics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>diagnostics: none yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>diagnostics silent</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>1 error</source>
+        <translation>1 Fehler</translation>
+    </message>
+    <message>
+        <source>%1 errors</source>
+        <translation>%1 Fehler</translation>
+    </message>
+    <message>
+        <source>%1 silent</source>
+        <translation>%1 stumm</translation>
+    </message>
+    <message>
+        <source>1 warning</source>
+        <translation>1 Warnung</translation>
+    </message>
+    <message>
+        <source>%1 warnings</source>
+        <translation>%1 Warnungen</translation>
+    </message>
+    <message>
+        <source>no alarm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>selected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>TWO OF THIS NAME</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>GONE</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>nothing to show</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>%1 s</source>
+        <translation>%1 s</translation>
+    </message>
+    <message>
+        <source>no camera</source>
+        <translation type="unfinished"></translation>
     </message>
 </context>
 <context>

@@ -69,7 +69,7 @@ T.Popup {
                 ThemeText {
                     id: keys
                     anchors { right: parent.right; rightMargin: Theme.gap; verticalCenter: parent.verticalCenter }
-                    text: modelData.keys
+                    text: modelData.shown
                     color: Theme.dim
                 }
                 MouseArea { anchors.fill: parent; onClicked: palette.carryOut(index) }
