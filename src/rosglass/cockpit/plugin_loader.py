@@ -33,9 +33,10 @@ __all__ = ["PluginLoader"]
 _MODULES = Path(__file__).parent / "rqml_modules"
 #: The item around plugins that import the Material style, and the name of that module.
 _LOOK, _MATERIAL = Path(__file__).parent / "rqml_look/MaterialLook.qml", "QtQuick.Controls.Material"
-#: Milliseconds: a plugin asks for topics and services once, when it is loaded. So it is loaded
-#: when the graph has not changed for a while, or at last after a longer one.
-_QUIET_MS, _MAX_WAIT_MS = 400, 3000
+#: Milliseconds: a plugin asks for nodes, topics and services once, when it is loaded. So it is
+#: loaded when others are in the graph and it has not changed for a while, or at last after a
+#: longer one; nodes on Fast DDS are known up to four seconds after their program.
+_QUIET_MS, _MAX_WAIT_MS, _MAX_UNNAMED_MS = 400, 3000, 6000
 #: Milliseconds in which a plugin's changes of its context are collected.
 _COLLECT_MS = 300
 #: Errors kept of a running plugin.
@@ -203,11 +204,15 @@ class PluginLoader(QtQuick.QQuickItem):
         """Load the plugin once the graph has settled, or if there is no robot."""
         if self.status != "waiting" or self._runtime is None or not is_alive(self):
             return
-        session, left = self._runtime.session, _MAX_WAIT_MS - self._started.elapsed()
+        session, elapsed = self._runtime.session, self._started.elapsed()
+        left, node = _MAX_WAIT_MS - elapsed, session.node
         if session.state == "failed":
             left = 0
-        elif session.node is not None and session.state == "connected":
-            left = min(left, _QUIET_MS)
+        elif node is not None and session.state == "connected":
+            if node.unnamed_programs():
+                left = _MAX_UNNAMED_MS - elapsed
+            elif len(node.nodes()) > 1:
+                left = min(left, _QUIET_MS)
         self._pause.start(max(0, left))
 
     @Slot()

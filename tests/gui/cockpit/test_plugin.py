@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -142,6 +143,21 @@ def test_a_plugin_has_context_name_size_and_colours(bench: PluginBench) -> None:
     assert bench.shown.width() >= 500
     assert bench.value("background").name() == "#0e151d"  # the theme's panel
     assert (plugin.property("complaints"), plugin.property("file")) == (0, str(QML / "Counter.qml"))
+
+
+@only_qt6
+def test_a_plugin_waits_for_the_nodes_of_the_robot(bench: PluginBench) -> None:
+    bench.robot.close()
+
+    def start() -> None:
+        bench.robot = bench.world.connect(None, "robot")
+        bench.robot.create_publisher("/scan", "sensor_msgs/msg/LaserScan")
+
+    late = threading.Timer(2, start)
+    late.start()
+    bench.show(source("Counter.qml"))
+    late.join()
+    assert "/scan" in bench.value("topicsAtStart")
 
 
 @only_qt6
