@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import threading
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from hands import click, key, write
+
+from rosglass.controls.lists.message_store import run_later
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -267,6 +272,36 @@ def test_broken_file_is_named_and_left_alone(form: Form, state: Path, text: str)
     form.wait.settled(form.controls.bench.session)
     assert file.read_text() == text
     assert form.fields() == {"data": False}
+
+
+def test_lost_disk_blocks_only_the_history(form: Form, state: Path) -> None:
+    state.mkdir(parents=True)
+    disk = state / "std_msgs__msg__Bool.json"
+    # Opening it waits for a writer.
+    os.mkfifo(disk)
+    try:
+        form.show("std_msgs/msg/Bool")
+        assert form.model.setText("data", "true")
+        assert form.fields() == {"data": True}
+        form.model.remember()
+        form.show("std_msgs/msg/Int32")
+        assert form.fields() == {"data": 0}
+    finally:
+        # Not only once: it is opened for each job.
+        stop = threading.Event()
+
+        def release() -> None:
+            while not stop.is_set():
+                with suppress(OSError):
+                    os.close(os.open(disk, os.O_WRONLY | os.O_NONBLOCK))
+
+        releasing = threading.Thread(target=release)
+        releasing.start()
+        done = threading.Event()
+        run_later(done.set)
+        assert done.wait(30)
+        stop.set()
+        releasing.join()
 
 
 def test_favourite_is_kept_by_the_keyboard(form: Form, controls: Any) -> None:

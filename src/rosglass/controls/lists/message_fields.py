@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import rosglass
 from rosglass.controls.lists.field_hints import choices_of, range_of
 from rosglass.controls.lists.field_tree import FieldTree, entered_value, fits_line, value_text
-from rosglass.controls.lists.message_store import MessageStore, Stored
+from rosglass.controls.lists.message_store import MessageStore, Stored, run_later
 from rosglass.controls.lists.texts import bounded
 from rosglass.errors import ConversionError, Error, InvalidNameError, TypeNotFoundError
 from rosglass.qml.elements.element import RETRY_MS, Element, single_shot
@@ -428,11 +428,20 @@ class MessageFields(Element):
             self._keep(lambda: store.remove_favourite(name))
 
     def _keep(self, job: Callable[[], Stored]) -> None:
-        """Read or write the kept messages on the worker thread: a disk may be slow."""
         session, kind = self._session, self._kind
-        if session is not None:
-            show = weak_callback(self._on_kept)
-            session.background(job, lambda result: show(kind, result))
+        if session is None:
+            return
+        show, post = weak_callback(self._on_kept), session.executor.post
+
+        def run() -> None:
+            result: Stored | Error
+            try:
+                result = job()
+            except Error as error:
+                result = error
+            post(lambda: show(kind, result))
+
+        run_later(run)
 
     def _on_kept(self, kind: MessageType, result: Stored | Error) -> None:
         if not is_alive(self) or kind is not self._kind:

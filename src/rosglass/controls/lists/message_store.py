@@ -8,24 +8,48 @@ from __future__ import annotations
 
 import json
 import os
+import queue
 import re
 import threading
 import time
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.errors import Error
 
-__all__ = ["MAX_FAVOURITES", "MAX_HISTORY", "MessageStore", "Stored"]
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["MAX_FAVOURITES", "MAX_HISTORY", "MessageStore", "Stored", "run_later"]
 
 #: Sent messages and favourites of a type.
 MAX_HISTORY, MAX_FAVOURITES = 20, 50
 #: Characters of a message, and bytes of a file, that are kept and read.
 _MAX_MESSAGE, _MAX_FILE = 50_000, 4_000_000
 _MAX_NAME = 60
-#: Changes of this program's forms, one after another.
-_lock = threading.Lock()
+
+
+def run_later(job: Callable[[], None]) -> None:
+    """Run a job that reads or writes kept messages, in the order of the calls.
+
+    On a thread of its own: a lost network disk must not block the session's worker, which serves
+    the robot, nor the end of the program.
+    """
+    _jobs().put(job)
+
+
+@cache
+def _jobs() -> queue.SimpleQueue[Callable[[], None]]:
+    jobs: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+
+    def run() -> None:
+        while True:
+            jobs.get()()
+
+    threading.Thread(target=run, name="kept messages", daemon=True).start()
+    return jobs
 
 
 class Stored(NamedTuple):
@@ -41,7 +65,7 @@ class Stored(NamedTuple):
 
 
 class MessageStore:
-    """The kept messages of one type. The methods read and write files: not for the GUI thread.
+    """The kept messages of one type. The methods read and write files: for :func:`run_later`.
 
     Args:
         kind: Full name of the type.
@@ -83,10 +107,9 @@ class MessageStore:
         """
         if len(message) > _MAX_MESSAGE:
             raise Error(f"the message is not kept: it has {len(message):,} characters")
-        with _lock:
-            now = self.read()
-            rest = [one for one in now.history if one != message]
-            return self._write(Stored((message, *rest)[:MAX_HISTORY], now.favourites))
+        now = self.read()
+        rest = [one for one in now.history if one != message]
+        return self._write(Stored((message, *rest)[:MAX_HISTORY], now.favourites))
 
     def add_favourite(self, name: str, message: str) -> Stored:
         """Keep a message under a name, instead of one that has the name; return what is kept.
@@ -100,19 +123,17 @@ class MessageStore:
             raise Error(f"a favourite has a name of 1 to {_MAX_NAME} characters, got {name!r:.80}")
         if len(message) > _MAX_MESSAGE:
             raise Error(f"{name} is not kept: it has {len(message):,} characters")
-        with _lock:
-            now = self.read()
-            favourites = {**dict(now.favourites), name: message}
-            if len(favourites) > MAX_FAVOURITES:
-                raise Error(f"{MAX_FAVOURITES} favourites are kept: remove one first")
-            return self._write(Stored(now.history, tuple(sorted(favourites.items()))))
+        now = self.read()
+        favourites = {**dict(now.favourites), name: message}
+        if len(favourites) > MAX_FAVOURITES:
+            raise Error(f"{MAX_FAVOURITES} favourites are kept: remove one first")
+        return self._write(Stored(now.history, tuple(sorted(favourites.items()))))
 
     def remove_favourite(self, name: str) -> Stored:
         """Forget a favourite; return what is kept. Raises Error as :meth:`read` does."""
-        with _lock:
-            now = self.read()
-            left = tuple(one for one in now.favourites if one[0] != name)
-            return self._write(Stored(now.history, left))
+        now = self.read()
+        left = tuple(one for one in now.favourites if one[0] != name)
+        return self._write(Stored(now.history, left))
 
     def _write(self, stored: Stored) -> Stored:
         """Replace the file: readers see the old one or the new one, never a part."""
