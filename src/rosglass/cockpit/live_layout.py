@@ -94,6 +94,7 @@ class LiveLayout(QtCore.QObject):
         #: Address of an item that was created by itself -> its component, and its ids.
         self._apart: dict[int, tuple[QtQml.QQmlComponent, frozenset[str]]] = {}
         self._problem = ""
+        self._follow_size()
 
     # -- what is shown ---------------------------------------------------------------------------
 
@@ -120,6 +121,7 @@ class LiveLayout(QtCore.QObject):
     def put_into(self, container: Any) -> None:
         """Show the layout in an item, which it fills; None takes it off the screen."""
         self._container = container
+        self._follow_size()
         if is_alive(self._root):
             self._root.setParentItem(container)
             self._fill()
@@ -248,20 +250,25 @@ class LiveLayout(QtCore.QObject):
                 return inside
         return None
 
-    def _fill(self) -> None:
-        root, container = self._root, self._container
-        if not isinstance(root, QtQuick.QQuickItem) or container is None:
+    def _follow_size(self) -> None:
+        """Keep the root as large as the container, from now on."""
+        weak, box = ref(self), self._container
+        if box is None:
             return
-        weak, box = ref(root), ref(container)
 
         def resize() -> None:
-            item, around = weak(), box()
-            if item is not None and around is not None and is_alive(item) and is_alive(around):
-                item.setSize(QtCore.QSizeF(around.width(), around.height()))
+            layout = weak()
+            # Another container may have taken its place.
+            if layout is not None and is_alive(layout) and layout._container is box:
+                layout._fill()
 
-        container.widthChanged.connect(resize)
-        container.heightChanged.connect(resize)
-        resize()
+        box.widthChanged.connect(resize)
+        box.heightChanged.connect(resize)
+
+    def _fill(self) -> None:
+        root, box = self._root, self._container
+        if isinstance(root, QtQuick.QQuickItem) and is_alive(root) and is_alive(box):
+            root.setSize(QtCore.QSizeF(box.width(), box.height()))
 
     # -- the living items ------------------------------------------------------------------------
 

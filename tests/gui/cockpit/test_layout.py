@@ -318,3 +318,52 @@ def test_a_tile_leads_to_the_page_of_its_robot(layouts: Any, ns: str) -> None:
     cockpit.setProperty("editing", True)
     tiles.choose_(1)
     assert cockpit.property("pageIndex") == 0
+
+
+@pytest.mark.parametrize("change", ["page", "maximize", "edit"])
+def test_an_input_beside_the_pages_halts_until_it_is_let_go(layouts: Any, change: str) -> None:
+    """Such as a gamepad: its own window and visibility stay as they are."""
+    root = layouts.show(
+        f"""property bool driving: command.active
+        property bool held: true
+        TwistCommand {{ id: command; topic: "cmd_vel" }}
+        Item {{
+            id: input
+            Timer {{
+                interval: 40; repeat: true; running: true
+                onTriggered: made.held ? command.steer(input, 1, 0) : command.release(input)
+            }}
+        }}
+        Page {{ {panel("a")} {panel("b")} }}
+        Page {{ {panel("c")} }}"""
+    )
+    subscription = layouts.robot.create_subscription(
+        "/cmd_vel", "geometry_msgs/msg/Twist", lambda _: None
+    )
+
+    letting_go = 0
+
+    def is_driving() -> bool:
+        # A busy machine may halt it; then it is let go for some turns.
+        nonlocal letting_go
+        if root.property("driving"):
+            return True
+        letting_go = (letting_go + 1) % 60
+        root.setProperty("held", letting_go < 40)
+        return False
+
+    layouts.wait(is_driving)
+    root.setProperty("held", True)
+    layouts.key("F6")
+    if change == "page":
+        layouts.key("Ctrl+2")
+    elif change == "maximize":
+        layouts.key("F11")
+    else:
+        root.setProperty("editing", True)
+    assert not root.property("driving")
+    # Still held: nothing moves.
+    layouts.wait.nothing_happens(0.3)
+    assert not root.property("driving")
+    layouts.wait(is_driving)
+    subscription.close()

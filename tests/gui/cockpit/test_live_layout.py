@@ -459,3 +459,19 @@ def test_types_written_by_hand_are_not_followed_but_shown(stage: Stage) -> None:
     assert refused == ["This was written by hand: change it in the text of the layout"]
     assert stage.show(text.replace('title: "B"', 'title: "Z"'))
     assert len(stage.loads) == 3
+
+
+def test_a_layout_fills_its_container(stage: Stage) -> None:
+    from rosglass.qt import QtCore, QtQuick
+
+    stage.window.contentItem().setSize(QtCore.QSizeF(500, 400))
+    assert (stage.live.root.width(), stage.live.root.height()) == (500, 400)
+    other = QtQuick.QQuickItem(stage.window.contentItem())
+    other.setSize(QtCore.QSizeF(300, 200))
+    stage.live.put_into(other)
+    assert stage.live.root.parentItem() is other
+    assert stage.live.root.width() == 300
+    other.setSize(QtCore.QSizeF(310, 200))
+    assert stage.live.root.width() == 310
+    stage.window.contentItem().setSize(QtCore.QSizeF(600, 400))
+    assert stage.live.root.width() == 310

@@ -38,6 +38,7 @@ Rectangle {
                 height: row.height
                 width: Math.min(implicitWidth, (bar.width - buttons.width) / Math.max(1, bar.tabs.count))
                 text: element_ && element_.title_ ? element_.title_ : qsTr("Tab %1").arg(index + 1)
+                hint: element_ !== null && element_.status_ ? element_.status_ : ""
                 wrong: element_ !== null && element_.wrong_ === true
                 selected: bar.tabs.currentItem === element_
                 onClicked: bar.tabs.show(index)
