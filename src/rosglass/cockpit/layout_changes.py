@@ -24,6 +24,7 @@ __all__ = ["Changes", "Setting", "elements_in", "elements_of", "text_of"]
 _DEFAULTS = {
     "share": "1",
     "title": '""',
+    "ns": '""',
     "orientation": "Qt.Horizontal",
     "screenName": '""',
     "fullScreen": "false",

@@ -16,7 +16,7 @@ from rosglass.cockpit.layout_changes import Changes, elements_in, elements_of, t
 from rosglass.cockpit.layout_edits import LayoutEdits, element_of
 from rosglass.cockpit.qml_document import Document, to_qml
 from rosglass.errors import Error, QmlError
-from rosglass.qml.run.live_file import LiveFile, create
+from rosglass.qml.run.live_file import LiveFile, create, register_imports
 from rosglass.qml.run.load_errors import error_list
 from rosglass.qt import QtCore, QtQml, QtQuick, Signal, address, is_alive
 
@@ -154,7 +154,7 @@ class LiveLayout(QtCore.QObject):
         try:
             if not self._follow(document):
                 self._load(document)
-        except QmlError as error:
+        except Error as error:
             self._set_problem(str(error))
             return False
         self._set_problem("")
@@ -166,7 +166,7 @@ class LiveLayout(QtCore.QObject):
             return False
         try:
             self._load(self._document)
-        except QmlError as error:
+        except Error as error:
             self._set_problem(str(error))
             return False
         self._set_problem("")
@@ -379,6 +379,8 @@ class LiveLayout(QtCore.QObject):
         Raises:
             _NotFollowedError: One cannot be created alone.
         """
+        if changes.created:
+            register_imports(self._live.path, self._live.engine, document.text)
         made: dict[Path, Any] = {}
         for path in changes.created:
             found = document.at(path)

@@ -347,6 +347,35 @@ def test_a_new_panel_and_a_new_import(stage: Stage) -> None:
     assert stage.find("mark_F") is not None
 
 
+def test_types_of_a_new_import_are_registered(python: Any, tmp_path: Path) -> None:
+    """In a process of its own, where no other test has registered them."""
+    (tmp_path / "Mark.qml").write_text(MARK)
+    program = python(
+        f"""
+import json
+from rosglass.qt import QtCore, QtGui, QtQuick
+app = QtGui.QGuiApplication([])
+from rosglass.cockpit.live_layout import LiveLayout
+from rosglass.cockpit.qml_document import Document
+from rosglass.qml import Session
+session = Session("local://imports")
+live = LiveLayout({str(tmp_path / "layout.qml")!r}, session)
+text = {LAYOUT!r}
+assert live.show(Document(text)), live.problem
+loads = []
+live.loaded.connect(lambda: loads.append(1))
+text = text.replace("import Ros2 1.0", "import Ros2 1.0\\nimport RosScene 1.0")
+text = text.replace('Mark {{ name: "e" }}', "SceneView {{}}")
+assert live.show(Document(text)), live.problem
+page = live.document.root.children[-1]
+print("PROBLEM", repr(live.item_of(page.children[0]).property("problem")), loads, flush=True)
+live.close()
+session.close()
+"""
+    )
+    assert program.until("PROBLEM") == "PROBLEM '' []"
+
+
 @pytest.mark.parametrize(
     "change",
     [
