@@ -19,7 +19,7 @@ Window {
             height: parent.height
             title: "Emergency stop"
             path: "/emergency_stop/state:data"
-            tint: "bad"
+            tint: Theme.bad
             onText: qsTr("STOPPED")
             offText: qsTr("released")
         }

@@ -13,8 +13,8 @@ LiveFrame {
     property real below: NaN
     // How far behind a threshold the value has to be until the lamp goes out.
     property real hysteresis: 0
-    // "good", "warn", "bad" or "accent": the colour while it is lit.
-    property string tint: "good"
+    // Colour while it is lit.
+    property color tint: Theme.good
     // Text while it is lit.
     property string onText: qsTr("ON")
     // Text while it is dark.
@@ -27,7 +27,6 @@ LiveFrame {
 
     property bool lit_: false
     readonly property bool known_: !isNaN(value)
-    readonly property color color_: ({ good: Theme.good, warn: Theme.warn, bad: Theme.bad, accent: Theme.accent })[tint] || Theme.good
     readonly property string text_: !known_ ? qsTr("?") : lit ? onText : offText
 
     function judge_() {
@@ -43,7 +42,6 @@ LiveFrame {
     source: live
     problem: live.problem
         || (!path ? qsTr("set path: \"topic:field\", or drop a field here") : "")
-        || (["good", "warn", "bad", "accent"].indexOf(tint) >= 0 ? "" : qsTr("tint is \"good\", \"warn\", \"bad\" or \"accent\", not \"%1\"").arg(tint))
         || (live.message !== undefined && !known_ ? qsTr("not a number") : "")
     contentWidth: 100 * Theme.size
     contentHeight: 48 * Theme.size
@@ -63,14 +61,14 @@ LiveFrame {
         width: Math.max(0, most)
         height: width
         radius: width / 2
-        color: lamp.lit ? lamp.color_ : Theme.track
-        border { color: lamp.lit ? lamp.color_ : Theme.faint; width: Math.max(2, width * 0.06) }
+        color: lamp.lit ? lamp.tint : Theme.track
+        border { color: lamp.lit ? lamp.tint : Theme.faint; width: Math.max(2, width * 0.06) }
     }
     ThemeText {
         objectName: "text"
         anchors { left: bulb.right; leftMargin: Theme.gap; right: parent.right; verticalCenter: parent.verticalCenter }
         text: lamp.text_
-        color: lamp.lit ? lamp.color_ : Theme.text
+        color: lamp.lit ? lamp.tint : Theme.text
         fontSizeMode: Text.HorizontalFit
         minimumPixelSize: Theme.small
         font { pixelSize: Theme.large; weight: Font.DemiBold }
