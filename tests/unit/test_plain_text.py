@@ -24,7 +24,9 @@ CONTROLS = {
     *("RadioDelegate", "SwipeDelegate", "ToolTip", "ComboBox", "GroupBox", "Dialog"),
 }
 #: Expressions that texts of controls may contain besides literals: nothing of a robot.
-OURS = {"isOn", "replay.playing", "replay.rate", "modelData.name", "label.text"}
+OURS = {"isOn", "replay.playing", "replay.rate", "modelData.name", "label.text", "readonly"}
+#: Shows pages of rosglass's own documentation.
+HELP = "src/rosglass/cockpit/editor/HelpBox.qml"
 LITERAL = r'(?:"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\')'
 
 
@@ -35,6 +37,7 @@ class Element(NamedTuple):
     text: str
     outline: str
     file_text: str
+    is_own: bool
 
 
 def _blank(text: str) -> str:
@@ -49,7 +52,9 @@ def _blank(text: str) -> str:
     return re.sub(pattern, blank, text, flags=re.DOTALL)
 
 
-def elements(text: str, place: str, first_line: int = 1) -> Iterator[Element]:
+def elements(
+    text: str, place: str, first_line: int = 1, own: frozenset[str] = frozenset()
+) -> Iterator[Element]:
     """Iterate over the objects that a QML text declares."""
     blanked = _blank(text)
     for found in re.finditer(r"\b([A-Z]\w*)\s*\{", blanked):
@@ -60,7 +65,7 @@ def elements(text: str, place: str, first_line: int = 1) -> Iterator[Element]:
             end += 1
         line = first_line + text.count("\n", 0, found.start())
         inner = text[found.end() : end]
-        yield Element(f"{place}:{line}", found[1], inner, "".join(outline), text)
+        yield Element(f"{place}:{line}", found[1], inner, "".join(outline), text, found[1] in own)
 
 
 def sources() -> list[Path]:
@@ -72,7 +77,8 @@ def sources() -> list[Path]:
 def elements_of(file: Path) -> Iterator[Element]:
     text, place = file.read_text(encoding="utf-8"), str(file.relative_to(ROOT))
     if file.suffix == ".qml":
-        yield from elements(text, place)
+        own = frozenset(one.stem for one in file.parent.glob("*.qml"))
+        yield from elements(text, place, own=own)
         return
     for block in re.finditer(r"```qml\n(.*?)```", text, re.DOTALL):
         yield from elements(block[1], place, 1 + text.count("\n", 0, block.start(1)))
@@ -98,9 +104,13 @@ def problem(element: Element) -> str:
             return f"{element.kind} wraps without maximumLineCount"
         if re.search(r"textFormat\s*:\s*Text\.PlainText\b", element.outline):
             return ""
+        if element.place.startswith(HELP) and "Text.MarkdownText" in element.outline:
+            return ""
         return f"{element.kind} without textFormat"
     if element.kind == "ComboBox":  # its own text is in a text field, which shows plain text
         return "" if "delegate" in element.outline else "ComboBox without a delegate"
+    if element.kind in CONTROLS and element.is_own:
+        return ""  # another type of this name, in the same folder
     if element.kind in CONTROLS and bound and "contentItem" not in element.outline:
         names = re.findall(r"[A-Za-z_][\w.]*", _blank(re.split(r";|\}", value)[0]))
         foreign = set(names) - OURS - {"qsTr"}

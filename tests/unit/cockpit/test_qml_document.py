@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-from pathlib import Path
 
 import pytest
 
@@ -443,24 +442,3 @@ class TestHostileText:
         after = after.remove_object(after.root.children[0])
         assert len(after.root.objects) == len(document.root.objects) - 1
         assert document.set_id(document.root, "a").root.id == "a"
-
-
-ROOT = Path(rosglass.__file__).parents[2]
-
-
-def qml_files() -> list[Path]:
-    """Return the QML files of this project and of Qt's own modules."""
-    import PySide6
-
-    roots = [ROOT / "src", ROOT / "examples", Path(PySide6.__path__[0])]
-    return [path for root in roots for path in sorted(root.rglob("*.qml"))]
-
-
-def test_all_files_of_the_project_and_of_qt_are_read() -> None:
-    files = qml_files()
-    assert len(files) > 900
-    for path in files:
-        text = path.read_bytes().decode()
-        document = Document(text, str(path))
-        for found in document.objects():
-            assert document.at(found.path) is found

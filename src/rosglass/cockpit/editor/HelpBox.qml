@@ -39,7 +39,7 @@ T.Popup {
                 text: program.helpText
                 color: Theme.text
                 linkColor: Theme.accent
-                wrapMode: Text.Wrap
+                wrapMode: Text.WordWrap
                 font.pixelSize: Theme.normal
                 Accessible.role: Accessible.StaticText
                 Accessible.name: text

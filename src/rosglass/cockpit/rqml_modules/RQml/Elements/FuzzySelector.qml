@@ -95,6 +95,7 @@ FocusScope {
 
         Label {
             id: arrow
+            textFormat: Text.PlainText
             anchors { right: parent.right; rightMargin: 8; verticalCenter: parent.verticalCenter }
             text: IconFont.iconChevronDown
             font { family: IconFont.name; pixelSize: 12 }
@@ -133,7 +134,12 @@ FocusScope {
                 required property string modelData
                 required property int index
                 width: rows.width
-                text: modelData
+                contentItem: Label {
+                    text: modelData
+                    textFormat: Text.PlainText
+                    elide: Text.ElideRight
+                }
+                Accessible.name: modelData
                 highlighted: index === rows.currentIndex
                 onClicked: {
                     selector.choose_(modelData)

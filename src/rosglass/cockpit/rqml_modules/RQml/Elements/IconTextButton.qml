@@ -18,6 +18,7 @@ Button {
         spacing: 6
 
         Label {
+            textFormat: Text.PlainText
             visible: text !== ""
             text: button.iconText
             font: button.iconFont

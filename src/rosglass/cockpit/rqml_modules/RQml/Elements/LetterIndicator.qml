@@ -18,6 +18,7 @@ Rectangle {
 
     Label {
         id: letter
+        textFormat: Text.PlainText
         anchors.centerIn: parent
         color: circle.textColor
         font { bold: true; pixelSize: 10 }
@@ -29,6 +30,10 @@ Rectangle {
     ToolTip {
         delay: 500
         text: circle.tooltipText
+        contentItem: Label {
+            text: circle.tooltipText
+            textFormat: Text.PlainText
+        }
         visible: pointer.hovered && text !== ""
     }
 }

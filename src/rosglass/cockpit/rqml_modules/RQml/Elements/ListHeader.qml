@@ -21,6 +21,7 @@ Item {
 
         Label {
             id: label
+            textFormat: Text.PlainText
             anchors { left: parent.left; leftMargin: 8; right: parent.right; verticalCenter: parent.verticalCenter }
             color: header.textColor
             font.bold: true

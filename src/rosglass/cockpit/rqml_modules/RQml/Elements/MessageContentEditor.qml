@@ -38,6 +38,7 @@ TreeView {
 
         Label {
             id: arrow
+            textFormat: Text.PlainText
             visible: cell.isTreeNode && cell.hasChildren
             x: 4 + 16 * cell.depth
             anchors.verticalCenter: parent.verticalCenter
@@ -61,6 +62,7 @@ TreeView {
             anchors { fill: parent; rightMargin: 8 }
 
             Label {
+                textFormat: Text.PlainText
                 visible: !cell.isTreeNode && cell.type_ === "array" && !cell.hasChildren
                 text: "[]"
             }

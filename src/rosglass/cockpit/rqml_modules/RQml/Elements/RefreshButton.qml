@@ -16,6 +16,7 @@ RoundButton {
     contentItem: Item {
         Label {
             id: icon
+            textFormat: Text.PlainText
             anchors.centerIn: parent
             text: button.text
             font: button.font

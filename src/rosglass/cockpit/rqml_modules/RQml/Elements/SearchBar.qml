@@ -50,6 +50,7 @@ RowLayout {
         }
 
         Label {
+            textFormat: Text.PlainText
             anchors { left: parent.left; leftMargin: 8; verticalCenter: parent.verticalCenter }
             text: IconFont.iconSearch
             font { family: IconFont.name; pixelSize: 12 }
@@ -57,6 +58,7 @@ RowLayout {
         }
         Label {
             id: erase
+            textFormat: Text.PlainText
             anchors { right: parent.right; rightMargin: 8; verticalCenter: parent.verticalCenter }
             visible: field.text !== ""
             text: IconFont.iconClose

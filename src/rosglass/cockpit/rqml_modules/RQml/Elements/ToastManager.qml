@@ -54,6 +54,7 @@ Item {
                 spacing: 10
 
                 Label {
+                    textFormat: Text.PlainText
                     text: toast.level === "error" ? IconFont.iconError : toast.level === "warning" ? IconFont.iconWarning : IconFont.iconInfo
                     font { family: IconFont.name; pixelSize: 18 }
                     color: "white"
@@ -63,6 +64,8 @@ Item {
                     text: toast.message
                     textFormat: Text.PlainText
                     wrapMode: Text.Wrap
+                    maximumLineCount: 12
+                    elide: Text.ElideRight
                     color: "white"
                 }
                 IconButton {

@@ -549,3 +549,12 @@ def test_history_gives_back_any_text(old: str, texts: Iterable[str]) -> None:
         known += [text] if text != known[-1] else []
     assert [history.undo() for _ in known[1:]] == known[-2::-1]
     assert [history.redo() for _ in known[1:]] == known[1:]
+
+
+def test_all_files_of_the_project_and_of_qt_are_read() -> None:
+    assert len(files()) > 900
+    for path in files():
+        text = path.read_bytes().decode()
+        document = Document(text, str(path))
+        for found in document.objects():
+            assert document.at(found.path) is found
