@@ -396,6 +396,11 @@ class CockpitProgram(QtCore.QObject):
         else:
             self.searchRobots()
 
+    def _keep_closed(self) -> None:
+        """Offer robots, unless there is a layout to go on with."""
+        if not self._has_layout() and self._search is None:
+            self.searchRobots()
+
     @Slot(str)
     def open(self, path: str) -> None:
         """Open a layout; an error is shown, and what is open stays."""
@@ -410,6 +415,7 @@ class CockpitProgram(QtCore.QObject):
             _log.error("%s", error)
             report(self, problem=str(error))
             self.say(str(error))
+            self._keep_closed()
             return
         found = [] if self._trusted.knows(path, file.text) else senders(document)
         if not found:
@@ -432,6 +438,7 @@ class CockpitProgram(QtCore.QObject):
 
     def _decide_on(self, index: int, file: LayoutFile, document: Document) -> None:
         if index == 2:
+            self._keep_closed()
             return
         if index == 0:
             self._try(lambda: self._trusted.trust_folder(file.path.parent))
@@ -710,10 +717,10 @@ class CockpitProgram(QtCore.QObject):
                 _Command(self.tr("Edit the layout, or use it"), "F4", "layout"),
                 self._toggle_edit,
             ),
-            "undo": (_Command(self.tr("Undo"), "Ctrl+Z", "layout"), self.undo),
-            "redo": (_Command(self.tr("Redo"), "Ctrl+Shift+Z", "layout"), self.redo),
-            "remove": (_Command(self.tr("Remove the selected panel"), "", "layout"), self._remove),
-            "add page": (_Command(self.tr("Add a page"), "", "layout"), self._add_page),
+            "undo": (_Command(self.tr("Undo"), "Ctrl+Z", "edit"), self.undo),
+            "redo": (_Command(self.tr("Redo"), "Ctrl+Shift+Z", "edit"), self.redo),
+            "remove": (_Command(self.tr("Remove the selected panel"), "", "edit"), self._remove),
+            "add page": (_Command(self.tr("Add a page"), "", "edit"), self._add_page),
             "add all": (_Command(self.tr("New layout of what the robot offers")), self.addAll),
             "search": (_Command(self.tr("Search robots")), self.searchRobots),
             "tour": (_Command(self.tr("Try it on a simulated robot")), self.startTour),
@@ -733,7 +740,7 @@ class CockpitProgram(QtCore.QObject):
                 "file": one.asks,
             }
             for name, (one, _) in self._commands().items()
-            if one.needs != "layout" or self._has_layout() or not text
+            if not one.needs or self._has_layout() or not text
         ]
         if not text:
             return rows
@@ -762,10 +769,20 @@ class CockpitProgram(QtCore.QObject):
             self.say(self.tr("there is no command {}").format(repr(name)))
             return
         command, carry_out = found
-        if command.needs == "layout" and not self._has_layout():
+        if command.needs and not self._has_layout():
             self.say(self.tr("open or make a layout first"))
             return
+        if command.needs == "edit" and not self.editing:
+            self.say(self.tr("the layout is changed in edit mode only: F4"))
+            return
+        self.halt()
         carry_out()
+
+    @Slot()
+    def halt(self) -> None:
+        """Halt all commands of the layout: what is held has to be let go first."""
+        if self._live is not None and is_alive(self._live.root):
+            QtCore.QMetaObject.invokeMethod(self._live.root, "halt")
 
     def _toggle_home(self) -> None:
         if self._has_layout():

@@ -986,6 +986,10 @@
         <translation>zuerst ein Layout öffnen oder anlegen</translation>
     </message>
     <message>
+        <source>the layout is changed in edit mode only: F4</source>
+        <translation>Das Layout wird nur beim Bearbeiten geändert: F4</translation>
+    </message>
+    <message>
         <source>select a panel first</source>
         <translation>zuerst ein Panel wählen</translation>
     </message>

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
 
 
 class LayoutBench:
@@ -103,3 +104,114 @@ def layouts(running: Any, wait: Callable[..., None]) -> LayoutBench:
 
     register()
     return LayoutBench(running, wait)
+
+
+class Editor:
+    """The editor's window, on a robot made of memory."""
+
+    def __init__(self, running: Any, wait: Any, layout: str | Path = "") -> None:
+        from rosglass.cockpit.modules import register
+        from rosglass.cockpit.program import WINDOW, CockpitProgram
+        from rosglass.qt import QtCore, QtQml
+
+        register()
+        self.bench, self.wait = running, wait
+        self.program: Any = CockpitProgram(layout)
+        running.engine.rootContext().setContextProperty("program", self.program)
+        component = QtQml.QQmlComponent(running.engine, QtCore.QUrl.fromLocalFile(str(WINDOW)))
+        self.window: Any = component.create()
+        assert self.window is not None, component.errorString()
+        running.roots += [self.window, component]
+        wait(self.window.isExposed)
+        self.window.requestActivate()
+        wait(self.window.isActive)
+
+    @property
+    def text(self) -> str:
+        return str(self.program._live.document.text)
+
+    @property
+    def root(self) -> Any:
+        return self.program._live.root
+
+    def find(self, name: str) -> Any:
+        """Return the item with an ``objectName``, once there is one."""
+
+        def look() -> Any:
+            waiting = [self.window.contentItem()]
+            while waiting:
+                one = waiting.pop()
+                if one.objectName() == name and one.isVisible():
+                    return one
+                waiting += one.childItems()
+            return None
+
+        self.wait(look)
+        return look()
+
+    def click(self, name: str) -> None:
+        from rosglass.qt import QtCore, optional
+
+        item = self.find(name)
+        at = item.mapToScene(QtCore.QPointF(item.width() / 2, item.height() / 2)).toPoint()
+        left, none = QtCore.Qt.MouseButton.LeftButton, QtCore.Qt.KeyboardModifier.NoModifier
+        optional("QtTest").QTest.mouseClick(self.window, left, none, at)
+
+    def answer(self, index: int) -> None:
+        """Click on an answer of the question, once it can be clicked."""
+        from rosglass.qt import QtCore
+
+        box = self.window.findChild(QtCore.QObject, "question")
+        self.wait(lambda: box.property("opened"))
+        item = self.find(f"answer{index}")
+        place: list[float] = []
+
+        def stands() -> bool:
+            place.append(item.mapToScene(QtCore.QPointF(0, 0)).x())
+            return len(place) > 3 and place[-1] == place[-3]
+
+        self.wait(stands)
+        self.click(f"answer{index}")
+        assert self.program.property("question") == ""
+
+    def key(self, text: str) -> None:
+        from rosglass.qt import QtGui, optional
+
+        pressed = QtGui.QKeySequence(text)[0]
+        optional("QtTest").QTest.keyClick(self.window, pressed.key(), pressed.keyboardModifiers())
+
+    def type(self, text: str) -> None:
+        from rosglass.qt import optional
+
+        for letter in text:
+            optional("QtTest").QTest.keyClick(self.window, letter)
+
+    def select(self, title: str) -> None:
+        """Select the panel with a title."""
+        live = self.program._live
+        found = next(
+            one
+            for one in live.document.objects()
+            if one.type == "Panel" and one.get("title") and one.get("title").value == title
+        )
+        self.root.setProperty("current", live.item_of(found))
+
+
+@pytest.fixture
+def edit(
+    running: Any, wait: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[..., Editor]]:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("ROSGLASS_URL", "local://empty")
+    made: list[Editor] = []
+
+    def start(layout: str | Path = "") -> Editor:
+        made.append(Editor(running, wait, layout))
+        return made[-1]
+
+    yield start
+    from rosglass.qt import send_deferred_deletes
+
+    for one in made:
+        one.program.close()
+    send_deferred_deletes()

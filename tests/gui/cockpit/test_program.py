@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("PySide6", reason="the editor needs Qt 6")
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from pathlib import Path
 
 LAYOUT = """import QtQuick 2.15
@@ -39,117 +39,6 @@ Cockpit {
 """
 
 
-class Editor:
-    """The editor's window, on a robot made of memory."""
-
-    def __init__(self, running: Any, wait: Any, layout: str | Path = "") -> None:
-        from rosglass.cockpit.modules import register
-        from rosglass.cockpit.program import WINDOW, CockpitProgram
-        from rosglass.qt import QtCore, QtQml
-
-        register()
-        self.bench, self.wait = running, wait
-        self.program: Any = CockpitProgram(layout)
-        running.engine.rootContext().setContextProperty("program", self.program)
-        component = QtQml.QQmlComponent(running.engine, QtCore.QUrl.fromLocalFile(str(WINDOW)))
-        self.window: Any = component.create()
-        assert self.window is not None, component.errorString()
-        running.roots += [self.window, component]
-        wait(self.window.isExposed)
-        self.window.requestActivate()
-        wait(self.window.isActive)
-
-    @property
-    def text(self) -> str:
-        return str(self.program._live.document.text)
-
-    @property
-    def root(self) -> Any:
-        return self.program._live.root
-
-    def find(self, name: str) -> Any:
-        """Return the item with an ``objectName``, once there is one."""
-
-        def look() -> Any:
-            waiting = [self.window.contentItem()]
-            while waiting:
-                one = waiting.pop()
-                if one.objectName() == name and one.isVisible():
-                    return one
-                waiting += one.childItems()
-            return None
-
-        self.wait(look)
-        return look()
-
-    def click(self, name: str) -> None:
-        from rosglass.qt import QtCore, optional
-
-        item = self.find(name)
-        at = item.mapToScene(QtCore.QPointF(item.width() / 2, item.height() / 2)).toPoint()
-        left, none = QtCore.Qt.MouseButton.LeftButton, QtCore.Qt.KeyboardModifier.NoModifier
-        optional("QtTest").QTest.mouseClick(self.window, left, none, at)
-
-    def answer(self, index: int) -> None:
-        """Click on an answer of the question, once it can be clicked."""
-        from rosglass.qt import QtCore
-
-        box = self.window.findChild(QtCore.QObject, "question")
-        self.wait(lambda: box.property("opened"))
-        item = self.find(f"answer{index}")
-        place: list[float] = []
-
-        def stands() -> bool:
-            place.append(item.mapToScene(QtCore.QPointF(0, 0)).x())
-            return len(place) > 3 and place[-1] == place[-3]
-
-        self.wait(stands)
-        self.click(f"answer{index}")
-        assert self.program.property("question") == ""
-
-    def key(self, text: str) -> None:
-        from rosglass.qt import QtGui, optional
-
-        pressed = QtGui.QKeySequence(text)[0]
-        optional("QtTest").QTest.keyClick(self.window, pressed.key(), pressed.keyboardModifiers())
-
-    def type(self, text: str) -> None:
-        from rosglass.qt import optional
-
-        for letter in text:
-            optional("QtTest").QTest.keyClick(self.window, letter)
-
-    def select(self, title: str) -> None:
-        """Select the panel with a title."""
-        live = self.program._live
-        found = next(
-            one
-            for one in live.document.objects()
-            if one.type == "Panel" and one.get("title") and one.get("title").value == title
-        )
-        self.root.setProperty("current", live.item_of(found))
-
-
-@pytest.fixture
-def edit(
-    running: Any, wait: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Callable[..., Editor]]:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setenv("ROSGLASS_URL", "local://empty")
-    made: list[Editor] = []
-
-    def start(layout: str | Path = "") -> Editor:
-        made.append(Editor(running, wait, layout))
-        return made[-1]
-
-    yield start
-    from rosglass.qt import send_deferred_deletes
-
-    for one in made:
-        one.program.close()
-    send_deferred_deletes()
-
-
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     path = tmp_path / "drive.qml"
@@ -157,7 +46,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_start_page_makes_a_layout(edit: Callable[..., Editor]) -> None:
+def test_start_page_makes_a_layout(edit: Callable[..., Any]) -> None:
     editor = edit()
     assert editor.find("startPage").isVisible()
     editor.click("new")
@@ -175,7 +64,7 @@ def test_start_page_makes_a_layout(edit: Callable[..., Editor]) -> None:
     assert "Battery {}" in editor.text
 
 
-def test_property_is_changed_on_its_own_line(edit: Callable[..., Editor], file: Path) -> None:
+def test_property_is_changed_on_its_own_line(edit: Callable[..., Any], file: Path) -> None:
     editor = edit(file)
     editor.wait(lambda: editor.program.property("opened"))
     editor.key("F4")
@@ -192,7 +81,7 @@ def test_property_is_changed_on_its_own_line(edit: Callable[..., Editor], file: 
     assert not editor.program.property("modified")
 
 
-def test_palette_finds_commands_in_spite_of_typos(edit: Callable[..., Editor], file: Path) -> None:
+def test_palette_finds_commands_in_spite_of_typos(edit: Callable[..., Any], file: Path) -> None:
     editor = edit(file)
     editor.wait(lambda: editor.program.property("opened"))
     editor.key("Ctrl+P")
@@ -203,20 +92,20 @@ def test_palette_finds_commands_in_spite_of_typos(edit: Callable[..., Editor], f
 
 
 def test_opened_layouts_are_remembered(
-    edit: Callable[..., Editor], file: Path, tmp_path: Path
+    edit: Callable[..., Any], file: Path, tmp_path: Path
 ) -> None:
     edit(file)
     assert json.loads((tmp_path / "state/rosglass/cockpit/recent.json").read_text()) == [str(file)]
 
 
-def test_broken_layout_is_named(edit: Callable[..., Editor], file: Path) -> None:
+def test_broken_layout_is_named(edit: Callable[..., Any], file: Path) -> None:
     file.write_text(LAYOUT.replace("Split {", "Split {{"))
     editor = edit(file)
     assert f"{file}:" in editor.program.property("problem")
     assert not editor.program.property("opened")
 
 
-def test_change_of_another_program_is_merged(edit: Callable[..., Editor], file: Path) -> None:
+def test_change_of_another_program_is_merged(edit: Callable[..., Any], file: Path) -> None:
     editor = edit(file)
     editor.wait(lambda: editor.program.property("opened"))
     editor.select("Power")
@@ -230,7 +119,7 @@ def test_change_of_another_program_is_merged(edit: Callable[..., Editor], file: 
     assert "Energy" in editor.text
 
 
-def test_changes_survive_a_crash(edit: Callable[..., Editor], file: Path) -> None:
+def test_changes_survive_a_crash(edit: Callable[..., Any], file: Path) -> None:
     editor = edit(file)
     editor.wait(lambda: editor.program.property("opened"))
     editor.select("Power")
@@ -241,7 +130,7 @@ def test_changes_survive_a_crash(edit: Callable[..., Editor], file: Path) -> Non
     again.wait(lambda: "Energy" in again.text)
 
 
-def test_help_of_a_panel_opens_its_page(edit: Callable[..., Editor], file: Path) -> None:
+def test_help_of_a_panel_opens_its_page(edit: Callable[..., Any], file: Path) -> None:
     editor = edit(file)
     editor.wait(lambda: editor.program.property("opened"))
     editor.select("Power")
@@ -253,7 +142,7 @@ def test_help_of_a_panel_opens_its_page(edit: Callable[..., Editor], file: Path)
 
 
 def test_layout_of_a_stranger_is_opened_once_it_is_agreed_to(
-    edit: Callable[..., Editor], file: Path
+    edit: Callable[..., Any], file: Path
 ) -> None:
     file.write_text(LAYOUT.replace("Attitude {}", "DriveStick {}"))
     editor = edit(file)

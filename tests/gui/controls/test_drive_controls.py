@@ -250,6 +250,14 @@ def test_stick_is_steered_by_the_arrow_keys(stick: Drive) -> None:
     stick.stands()
 
 
+def test_hidden_stick_that_kept_the_focus_does_not_steer(stick: Drive) -> None:
+    stick.item.forceActiveFocus()
+    stick.item.setProperty("visible", False)
+    stick.key(Key.Key_Up, down=True)
+    assert not stick.item.property("held")
+    stick.key(Key.Key_Up, down=False)
+
+
 def steal(stick: Drive) -> None:
     stick.controls.find("touch").ungrabMouse()
 

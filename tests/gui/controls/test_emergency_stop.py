@@ -260,6 +260,19 @@ def test_the_space_bar_stops_wherever_the_focus_is(controls: Any, wait: Any, lat
     test.keyRelease(controls.window, Key.Key_Return)
 
 
+def test_enter_does_not_release_by_a_hidden_button(controls: Any, wait: Any, latch: Latch) -> None:
+    stop = show(controls, wait)
+    stop.press()
+    wait(lambda: stop.property("stopped"))
+    stop.setProperty("visible", False)
+    test.keyPress(controls.window, Key.Key_Enter)
+    wait.nothing_happens(1.0)
+    test.keyRelease(controls.window, Key.Key_Enter)
+    assert latch.stopped
+    test.keyClick(controls.window, Key.Key_Space)
+    assert stop.property("wanted"), "it stops, hidden or not"
+
+
 def test_enter_has_to_be_held(controls: Any, wait: Any, latch: Latch) -> None:
     stop = show(controls, wait)
     stop.press()

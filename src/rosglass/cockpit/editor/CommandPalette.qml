@@ -27,6 +27,7 @@ T.Popup {
     modal: true
     focus: true
     padding: Theme.gap
+    onAboutToShow: program.halt()
     onOpened: { field.clear(); field.forceActiveFocus(); list.currentIndex = 0 }
 
     background: Rectangle {

@@ -52,6 +52,9 @@ Window {
         id: stage_
         objectName: "stage"
         anchors { left: catalogue.right; right: properties.left; top: bar.bottom; bottom: status.top }
+        // What is held behind the start page lets go; an item that is only hidden keeps the keyboard.
+        enabled: visible
+        visible: program.opened
     }
     StartPage {
         objectName: "startPage"
@@ -68,13 +71,15 @@ Window {
         id: status
         objectName: "status"
         anchors { left: parent.left; right: parent.right; bottom: parent.bottom }
+        // Always there: the layout does not move when there is something to say.
         height: visible ? 28 * Theme.size : 0
-        visible: !program.kiosk && program.message !== ""
+        visible: !program.kiosk
         color: Theme.panel
         ThemeText {
             anchors { fill: parent; leftMargin: Theme.gap; rightMargin: Theme.gap }
             verticalAlignment: Text.AlignVCenter
-            text: program.message
+            text: program.message || (program.opened ? program.path : "")
+            color: program.message ? Theme.text : Theme.dim
             Accessible.role: Accessible.AlertMessage
             Accessible.name: text
         }

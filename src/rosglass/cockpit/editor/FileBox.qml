@@ -7,6 +7,8 @@ Loader {
     property string purpose_
 
     function ask(purpose) {
+        // Loading the dialog takes its time.
+        program.halt()
         purpose_ = purpose
         active = true
         if (item)

@@ -18,11 +18,13 @@ T.Popup {
     parent: T.Overlay.overlay
     anchors.centerIn: parent
     width: parent ? Math.min(560 * Theme.size, parent.width - 2 * Theme.gap) : 100
+    implicitHeight: implicitContentHeight + topPadding + bottomPadding
     modal: true
     focus: true
     padding: 2 * Theme.gap
     closePolicy: T.Popup.NoAutoClose
 
+    T.Overlay.modal: Rectangle { color: Theme.shade; opacity: 0.7 }
     background: Rectangle {
         color: Theme.panel
         radius: Theme.radius

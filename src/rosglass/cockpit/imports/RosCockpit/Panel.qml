@@ -119,6 +119,8 @@ Item {
     }
 
     function openMenu() {
+        if (cockpit_)
+            cockpit_.halt()
         menu.active = true
         menu.item.open()
     }
@@ -167,6 +169,8 @@ Item {
     FocusScope {
         id: frame
         anchors.fill: parent
+        // An item that is only hidden keeps the keyboard: its keys would steer, and press its buttons.
+        enabled: visible
         Accessible.role: Accessible.Grouping
         Accessible.name: panel.title_
         Accessible.description: panel.problem || panel.status_

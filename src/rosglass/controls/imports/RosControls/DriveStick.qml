@@ -79,7 +79,8 @@ Item {
     }
     WindowKeys {
         id: keys
-        enabled: stick.activeFocus && !touch.held_
+        // The focus stays with an item that is hidden.
+        enabled: stick.activeFocus && stick.visible && !touch.held_
         keys: [Qt.Key_Up, Qt.Key_Down, Qt.Key_Left, Qt.Key_Right]
     }
 

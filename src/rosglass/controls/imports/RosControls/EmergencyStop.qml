@@ -311,7 +311,7 @@ Item {
     }
     WindowKeys {
         // A button that was reached by Tab keeps its Enter.
-        keys: stop.blocks && stop.releaseByEnter && (stop.activeFocus
+        keys: stop.blocks && stop.visible && stop.releaseByEnter && (stop.activeFocus
             || Stops.all.length === 1 && !(stop.Window.activeFocusItem && stop.Window.activeFocusItem.activeFocusOnTab))
             ? [Qt.Key_Return, Qt.Key_Enter] : []
         onPressed: stop.beginHold()
