@@ -1,7 +1,15 @@
 """Recordings: record topics to a file, and play files back."""
 
 from rosglass.bags.bag import Bag, BagMessage, Channel
-from rosglass.bags.player import Playback, Player, PlayerState, open_bag, read_marks
+from rosglass.bags.player import (
+    Playback,
+    Player,
+    PlayerState,
+    TopicDensity,
+    open_bag,
+    read_density,
+    read_marks,
+)
 from rosglass.bags.recorder import MARKS_TOPIC, Recorder, RecordingStatus
 from rosglass.bags.replay_node import ReplayNode
 
@@ -16,6 +24,8 @@ __all__ = [
     "Recorder",
     "RecordingStatus",
     "ReplayNode",
+    "TopicDensity",
     "open_bag",
+    "read_density",
     "read_marks",
 ]

@@ -172,6 +172,17 @@ class Bag(Handle):
             BagError: The file is damaged.
         """
 
+    def times(self) -> Iterator[tuple[Channel, Sequence[int]]]:
+        """Yield the times of all messages, in any order and in parts.
+
+        Formats with an index read it instead of the messages.
+
+        Raises:
+            BagError: The file is damaged.
+        """
+        for message in self.messages():
+            yield message.channel, (message.time,)
+
 
 class RecordingFile(ABC):
     """A recording that is being written; used from one thread.

@@ -53,6 +53,10 @@ _WIRES = {"cdr": "cdr", "ros1": "ros1"}
 #: The headers of a record (opcode, length) and of a message (channel, sequence, two times).
 _record_header = struct.Struct("<BQ")
 _message_header = struct.Struct("<HIQQ")
+#: The header of the index of one channel's messages in a chunk (channel, bytes of the entries).
+_index_header = struct.Struct("<HI")
+#: Bytes of the index of a chunk.
+_MAX_INDEX = 64 * 2**20
 #: rosbag2 writes "unknown" and no text for a type whose definition it did not find.
 _LANGUAGES = {"ros2msg": "msg", "ros1msg": "msg", "ros2idl": "idl", "unknown": "msg"}
 
@@ -113,6 +117,36 @@ class McapBag(ScannedBag):
         if not self._known and not self._foreign and last < 0 and not self.problem:
             self._add_problem("it holds no messages")
 
+    def times(self) -> Iterator[tuple[Channel, Sequence[int]]]:
+        """Yield the times of all messages; see :meth:`Bag.times`."""
+        if not self._chunks or any(not one.message_index_offsets for one in self._chunks):
+            yield from super().times()
+            return
+        with self.path.open("rb") as file:
+            for chunk in self._chunks:
+                for number, times in self._message_index(file, chunk):
+                    if number in self._known:
+                        yield self._known[number], times
+
+    def _message_index(
+        self, file: BinaryIO, chunk: ChunkIndex
+    ) -> Iterator[tuple[int, Sequence[int]]]:
+        """Yield the channels of a chunk, and the times of their messages."""
+        with self._damage_left_out(chunk.chunk_start_offset):
+            file.seek(min(chunk.message_index_offsets.values()))
+            data = file.read(min(chunk.message_index_length, _MAX_INDEX))
+            place = 0
+            while place < len(data):
+                opcode, size = _record_header.unpack_from(data, place)
+                place += _record_header.size
+                if opcode != Opcode.MESSAGE_INDEX or place + size > len(data):
+                    raise BagError("the index of a chunk's messages is damaged")
+                number, length = _index_header.unpack_from(data, place)
+                first = place + _index_header.size
+                entries = struct.unpack_from(f"<{length // 16 * 2}Q", data, first)
+                yield number, entries[::2]
+                place += size
+
     def _read(
         self, wanted: Collection[int], start: int | None, end: int | None
     ) -> Iterator[tuple[int, int, bytes]]:
@@ -122,7 +156,7 @@ class McapBag(ScannedBag):
         # Each pass opens the file, as passes may overlap.
         with self.path.open("rb") as file:
             yield from merge_chunks(
-                (index.message_start_time, self._indexed(file, index))
+                (index.message_start_time, self._indexed(file, index, wanted))
                 for index in self._chunks
                 if (start is None or index.message_end_time >= start)
                 and (end is None or index.message_start_time < end)
@@ -132,14 +166,16 @@ class McapBag(ScannedBag):
                 )
             )
 
-    def _indexed(self, file: BinaryIO, index: ChunkIndex) -> Iterator[tuple[int, int, bytes]]:
-        """Yield the messages of an indexed chunk."""
+    def _indexed(
+        self, file: BinaryIO, index: ChunkIndex, wanted: Collection[int]
+    ) -> Iterator[tuple[int, int, bytes]]:
+        """Yield the messages of the wanted channels in an indexed chunk."""
         with self._damage_left_out(index.chunk_start_offset):
             file.seek(index.chunk_start_offset)
             chunk = next(StreamReader(file, skip_magic=True, emit_chunks=True).records)
             if not isinstance(chunk, Chunk):
                 raise BagError("the index names a chunk, and there is none")
-            for record in self._unpacked(chunk, index.chunk_start_offset):
+            for record in self._unpacked(chunk, index.chunk_start_offset, wanted):
                 if isinstance(record, tuple):
                     yield record
 
@@ -177,9 +213,9 @@ class McapBag(ScannedBag):
             offset = file.tell()
 
     def _unpacked(
-        self, chunk: Chunk, offset: int
+        self, chunk: Chunk, offset: int, wanted: Collection[int] | None = None
     ) -> Iterator[Schema | ChannelRecord | tuple[int, int, bytes]]:
-        """Yield the content of a chunk, up to the first damage.
+        """Yield the content of a chunk, up to the first damage; of all channels by default.
 
         The package's own reader trusts declared sizes, and lists all records in memory.
         """
@@ -196,7 +232,8 @@ class McapBag(ScannedBag):
                     )
                 if opcode == Opcode.MESSAGE:
                     number, _, time, _ = _message_header.unpack_from(data, place)
-                    yield number, time, data[place + _message_header.size : end]
+                    if wanted is None or number in wanted:
+                        yield number, time, data[place + _message_header.size : end]
                 elif opcode == Opcode.SCHEMA:
                     yield Schema.read(ReadDataStream(io.BytesIO(data[place:end])))
                 elif opcode == Opcode.CHANNEL:

@@ -25,7 +25,16 @@ if TYPE_CHECKING:
     from rosglass.bags.bag import Bag, BagMessage, Channel
     from rosglass.comm import Node, Publisher
 
-__all__ = ["Playback", "Player", "PlayerState", "PlayerStatus", "open_bag", "read_marks"]
+__all__ = [
+    "Playback",
+    "Player",
+    "PlayerState",
+    "PlayerStatus",
+    "TopicDensity",
+    "open_bag",
+    "read_density",
+    "read_marks",
+]
 
 
 _log = logging.getLogger("rosglass.bags")
@@ -234,6 +243,36 @@ class Player(Handle):
         """Set whether to start again at the end."""
         with self._lock:
             self._loop = loop
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """First and last position of the part that is played, in seconds."""
+        return (self._begin - self._bag.start) / _NS, (self._last - self._bag.start) / _NS
+
+    def set_range(self, start: float, end: float) -> None:
+        """Play, and repeat, a part only; a position outside of it moves into it.
+
+        Args:
+            start: First position in seconds.
+            end: Position in seconds where the part ends.
+
+        Raises:
+            BagError: The recording has no such part.
+        """
+        length = max(self._bag.duration, 0.0)
+        _check("start", start, 0.0, length)
+        _check("end", end, 0.0, length)
+        if not start < end:
+            raise BagError(f"the end of the part, {end:g} s, must be after its start, {start:g} s")
+        with self._lock:
+            self._begin = self._bag.start + int(start * _NS)
+            last = self._bag.start + int(end * _NS)
+            # At the recording's end, its last message belongs to the part.
+            self._end = None if end >= length else last
+            self._last = min(last, self._bag.end)
+            now = self._position if self._target is None else self._target
+            self._target = min(max(now, self._begin), self._last)
+            self._lock.notify_all()
 
     def seek(self, seconds: float) -> None:
         """Move to a position in seconds; earlier latched messages are sent again.
@@ -626,6 +665,19 @@ class Playback(Handle):
         """Move to a position in seconds; raises BagError if there is none."""
         self._player.seek(seconds)
 
+    def step(self) -> None:
+        """Play the next message, and pause."""
+        self._player.step()
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """First and last position of the part that is played, in seconds."""
+        return self._player.range
+
+    def set_range(self, start: float, end: float) -> None:
+        """Play a part only; see :meth:`Player.set_range`."""
+        self._player.set_range(start, end)
+
     def set_rate(self, rate: float) -> None:
         """Set the speed; raises BagError if it is invalid."""
         self._player.set_rate(rate)
@@ -691,6 +743,57 @@ def read_marks(path: str | os.PathLike[str]) -> list[tuple[float, str]]:
     finally:
         bag.close()
     return found
+
+
+@dataclass(frozen=True)
+class TopicDensity:
+    """How the messages of a topic are spread over a recording.
+
+    Attributes:
+        topic: Absolute name.
+        type_name: Type of its messages.
+        count: Number of messages.
+        parts: Messages in each of the equal parts of the recording.
+    """
+
+    topic: str
+    type_name: str
+    count: int
+    parts: tuple[int, ...]
+
+
+def read_density(
+    path: str | os.PathLike[str], parts: int, ended: threading.Event | None = None
+) -> list[TopicDensity]:
+    """Return how the messages of each topic are spread over a recording, sorted by topic.
+
+    Without an index, the whole file is read.
+
+    Args:
+        path: The recording.
+        parts: Number of equal parts of its duration, from 1 to 10,000.
+        ended: Set to return early, with what was counted so far.
+
+    Raises:
+        BagError: It cannot be read, or `parts` is invalid.
+    """
+    _check("parts", parts, 1, 10_000)
+    bag = open_bag(path)
+    try:
+        counts = {channel: [0] * parts for channel in bag.channels}
+        length = max(1, bag.end - bag.start + 1)
+        for channel, times in bag.times():
+            row = counts[channel]
+            for at in times:
+                row[min(max((at - bag.start) * parts // length, 0), parts - 1)] += 1
+            if ended is not None and ended.is_set():
+                break
+    finally:
+        bag.close()
+    return [
+        TopicDensity(channel.topic, channel.type_name, sum(row), tuple(row))
+        for channel, row in sorted(counts.items(), key=lambda item: item[0].topic)
+    ]
 
 
 def _starts_with(path: Path, magic: bytes) -> bool:

@@ -25,7 +25,7 @@ from rosglass.errors import BagError
 from rosglass.interfaces.names import join_name
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Collection, Iterator, Sequence
 
 __all__ = ["RosbagsBag"]
 
@@ -130,6 +130,31 @@ class RosbagsBag(Bag):
                         self.problem = self._left_out.words()
                         continue
                 yield BagMessage(channel, time, content)
+
+    def times(self) -> Iterator[tuple[Channel, Sequence[int]]]:
+        """Yield the times of all messages; see :meth:`Bag.times`."""
+        if isinstance(self._reader, Ros1Reader):
+            for channel, connections in self._connections.items():
+                for connection in connections:
+                    index = self._reader.indexes.get(connection.id, ())
+                    yield channel, [entry.time for entry in index]
+            return
+        files = sorted(self.path.glob("*.db3")) if self.path.is_dir() else [self.path]
+        if not files or any(file.suffix != ".db3" for file in files):
+            yield from super().times()
+            return
+        named = {channel.topic: channel for channel in self.channels}
+        for file in files:
+            uri = f"{file.resolve().as_uri()}?immutable=1"
+            # Rows are read without their messages, which are behind the times.
+            with self._damage_reported(), closing(sqlite3.connect(uri, uri=True)) as database:
+                rows = database.execute(
+                    "SELECT topics.name, timestamp FROM messages "
+                    "JOIN topics ON topics.id = messages.topic_id"
+                )
+                for topic, time in rows:
+                    if topic in named:
+                        yield named[topic], (int(time),)
 
     def close(self) -> None:
         """Close the files."""

@@ -350,13 +350,13 @@ def _view(parser: argparse.ArgumentParser) -> None:
 def _cockpit(parser: argparse.ArgumentParser) -> None:
     layout = parser.add_argument(
         "layout",
-        metavar="LAYOUT.qml",
+        metavar="FILE",
         nargs="?",
         default="",
-        help="the layout to open; package://name/path for a file in a package (default: a page "
-        "with the robots found)",
+        help="the layout (.qml; package://name/path for a file in a package) or the recording "
+        "(.mcap, .bag, .db3) to open (default: a page with the robots found)",
     )
-    complete(layout, "*.qml")
+    complete(layout, "*.qml *.mcap *.bag *.db3")
     _add_robot_url(parser)
     parser.add_argument(
         "--panels",

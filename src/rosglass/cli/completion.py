@@ -38,7 +38,7 @@ def offer(parser: argparse.ArgumentParser) -> None:
     for argument in _arguments(parser):
         what = getattr(argument, "completes", "")
         if what.startswith("*."):
-            argument.completer = FilesCompleter((what.removeprefix("*."),))  # type: ignore[attr-defined]
+            argument.completer = FilesCompleter(tuple(what.replace("*.", "").split()))  # type: ignore[attr-defined]
         elif what:
             argument.completer = partial(complete_names, what)  # type: ignore[attr-defined]
     argcomplete.autocomplete(parser)

@@ -327,6 +327,6 @@ def complete(argument: argparse.Action, what: str) -> None:
         argument: As returned by ``add_argument``.
         what: ``topics``, ``services``, ``actions``, ``nodes``, ``messages``, ``interfaces`` (all
             kinds of types), ``service_types``, ``action_types`` or ``examples``; or, for files,
-            ``*.qml``.
+            ``*.qml *.mcap``.
     """
     argument.completes = what  # type: ignore[attr-defined]

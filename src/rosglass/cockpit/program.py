@@ -8,12 +8,14 @@ import logging
 import os
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rosglass.bags.replay_node import replay_url
 from rosglass.cockpit.first_layout import empty_layout, first_layout, panel_text, words_of
 from rosglass.cockpit.history import History
 from rosglass.cockpit.layout_edits import LayoutEdits
@@ -22,6 +24,7 @@ from rosglass.cockpit.live_layout import LiveLayout
 from rosglass.cockpit.panels import Panel, Proposal, controls, find, folder_panels, propose, search
 from rosglass.cockpit.property_form import PropertyModel
 from rosglass.cockpit.qml_document import Code, Document, to_qml
+from rosglass.cockpit.recordings import SCHEME, Examined, examine, is_recording, path_of
 from rosglass.cockpit.robots import FoundRobot, RobotSearch, addresses
 from rosglass.cockpit.rqml import RqmlPlugin, find_plugins
 from rosglass.cockpit.trust import TrustedLayouts, senders
@@ -82,7 +85,7 @@ class CockpitProgram(QtCore.QObject):
     """The model of the window of ``rosglass cockpit``: its texts, and what its buttons do.
 
     Args:
-        layout: The layout to open; empty for the start page.
+        layout: The layout or recording to open; empty for the start page.
         url: The robot; empty to look for one.
         panels: Folders with further panels: QML files, and plugins of RQml.
         import_paths: Further folders with QML modules.
@@ -123,8 +126,14 @@ class CockpitProgram(QtCore.QObject):
     #: Title and text (Markdown) of the page of help that is shown; empty if none is.
     helpText = ReadOnly(str, "")
     folder = ReadOnly(QtCore.QUrl, QtCore.QUrl())
+    #: Name of the recording that is shown instead of a robot; empty for a robot.
+    recording = ReadOnly(str, "")
 
+    #: The recorder is to start or stop, and to write a mark.
+    recordRequested = Signal()
+    markRequested = Signal()
     _found = Signal(object)
+    _examined = Signal(object)
 
     def __init__(
         self,
@@ -146,6 +155,9 @@ class CockpitProgram(QtCore.QObject):
         for plugin in plugins.plugins:
             self._panels.append(_plugin_panel(plugin))
             self._titles.append(plugin.name)
+        self._recording_url, self._robot_url = "", ""
+        if layout and is_recording(layout):
+            layout, url = "", replay_url(str(Path(layout).absolute()))
         self._to_open, self._url_given = (locate(layout) if layout else None), url
         if self._to_open is not None:
             choice.expect(self._to_open)
@@ -168,6 +180,7 @@ class CockpitProgram(QtCore.QObject):
         self._state = state_folder()
         self._trusted = TrustedLayouts()
         self._found.connect(self._on_found)
+        self._examined.connect(self._on_examined)
         self._timer = QtCore.QTimer(self)
         self._timer.setInterval(round(_LOOK_S * 1000))
         self._timer.timeout.connect(self._look)
@@ -224,6 +237,10 @@ class CockpitProgram(QtCore.QObject):
         """Connect to a robot; its panels are proposed once it has answered."""
         assert self._session is not None
         url = next((one for one in self._results if shown_url(one) == url), url.strip())
+        if url.startswith(SCHEME):
+            self._open_recording(url)
+            return
+        self._recording_url = ""
         self._session.url = url
         if not self._session.is_initialized:
             self._session.init("rosglass_cockpit")
@@ -245,6 +262,75 @@ class CockpitProgram(QtCore.QObject):
         ]
         report(self, proposals=rows)
         self._list_catalogue()
+
+    def _open_recording(self, url: str) -> None:
+        """Show a recording instead of the robot, once it could be read."""
+        self._recording_url = url
+        self.say(self.tr("reading {} …").format(path_of(url)))
+        examined = self._examined.emit
+        threading.Thread(
+            target=lambda: examined(examine(url)), name="open a recording", daemon=True
+        ).start()
+
+    def _on_examined(self, found: Examined) -> None:
+        session = self._session
+        if session is None or found.url != self._recording_url:
+            return  # another one was chosen since
+        if found.error:
+            _log.error("%s", found.error)
+            self._recording_url = session.url if session.url.startswith(SCHEME) else ""
+            self._ask(found.error, [self.tr("Close")], lambda _: None)
+            if not self._is_initialized() and self._search is None:
+                self.searchUsual()
+            return
+        if self._search is not None:
+            self._search.close()
+            self._search = None
+            report(self, searching=False)
+        if not session.url.startswith(SCHEME):
+            self._robot_url = session.url if session.is_initialized else ""
+        session.url = found.url
+        if not session.is_initialized:
+            session.init("rosglass_cockpit")
+        self._propose(FoundRobot(found.url, found.topics, ("/recording",)))
+        self.say(found.problem or self.tr("{} is open").format(path_of(found.url)))
+        self._look()
+        if not self._has_layout() and self._proposed:
+            self._start(first_layout(self._proposed, self.tr("Recording")), self.tr("Recording"))
+            self._edit_mode(False)
+
+    @Slot()
+    def closeRecording(self) -> None:
+        """Return to the robot that was shown before; to the start page without one."""
+        if not self.recording:
+            self.say(self.tr("no recording is open"))
+            return
+        self._recording_url = ""
+        if self._robot_url:
+            self.connectTo(self._robot_url)
+            return
+        assert self._session is not None
+        self._session.shutdown()
+        self._look()
+        self._at_home = True
+        self._edit_mode(False)
+        self._refresh()
+        self.searchUsual()
+
+    def searchUsual(self) -> None:
+        """Look for robots at the usual addresses, in place of a recording."""
+        if self._url_given.startswith(SCHEME):
+            self._url_given = ""
+        self.searchRobots()
+
+    def _record(self) -> None:
+        if self.recording:
+            self.say(self.tr("this is a recording; connect to a robot to record it"))
+            return
+        if not self._is_initialized():
+            self.say(self.tr("connect to a robot first"))
+            return
+        self.recordRequested.emit()
 
     @Slot()
     def startTour(self) -> None:
@@ -393,7 +479,9 @@ class CockpitProgram(QtCore.QObject):
         self._look()
         if self._to_open is not None:
             self.open(str(self._to_open))
-        else:
+        if self._url_given.startswith(SCHEME):
+            self._open_recording(self._url_given)
+        elif self._to_open is None:
             self.searchRobots()
 
     def _keep_closed(self) -> None:
@@ -725,6 +813,12 @@ class CockpitProgram(QtCore.QObject):
             "search": (_Command(self.tr("Search robots")), self.searchRobots),
             "tour": (_Command(self.tr("Try it on a simulated robot")), self.startTour),
             "open recording": (_Command(self.tr("Open a recording"), asks=True), lambda: None),
+            "close recording": (_Command(self.tr("Close the recording")), self.closeRecording),
+            "record": (_Command(self.tr("Record, or stop recording"), "Ctrl+R"), self._record),
+            "mark": (
+                _Command(self.tr("Mark this moment in the recording"), "Ctrl+M"),
+                self.markRequested.emit,
+            ),
             "help": (_Command(self.tr("Help")), lambda: self.help("")),
         }
 
@@ -851,7 +945,7 @@ class CockpitProgram(QtCore.QObject):
         if purpose == "open":
             self.open(str(path))
         elif purpose == "open recording":
-            self.connectTo(f"replay:{path}")
+            self._open_recording(replay_url(str(path)))
         elif ask and path.exists() and str(path) != self.path:
             self._ask(
                 self.tr("{} exists already.").format(path),
@@ -970,6 +1064,9 @@ class CockpitProgram(QtCore.QObject):
             connected=state == "connected",
             connection=detail,
             url=shown_url(session.url) if session.is_initialized else "",
+            recording=path_of(session.url).name
+            if session.is_initialized and session.url.startswith(SCHEME)
+            else "",
         )
         if self._file is not None and self._file.changed_outside() and not self.question:
             self._on_changed_outside(self._file)

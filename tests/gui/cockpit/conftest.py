@@ -1,4 +1,4 @@
-"""A bench that shows layouts of ``RosCockpit 1.0``."""
+"""Benches that show layouts of ``RosCockpit 1.0``, and the window of the editor."""
 
 from __future__ import annotations
 

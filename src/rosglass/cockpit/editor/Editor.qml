@@ -30,6 +30,7 @@ Window {
         anchors { left: parent.left; right: parent.right; top: parent.top }
         visible: !program.kiosk
         height: visible ? implicitHeight : 0
+        recordedSeconds: strip.recording ? strip.elapsed : -1
         onPaletteWanted: palette.open()
         onFileWanted: function(purpose) { files.ask(purpose) }
         onHelpWanted: program.help("")
@@ -37,21 +38,21 @@ Window {
     CatalogueBox {
         id: catalogue
         objectName: "catalogue"
-        anchors { left: parent.left; top: bar.bottom; bottom: status.top }
+        anchors { left: parent.left; top: bar.bottom; bottom: strip.top }
         width: visible ? Math.min(280 * Theme.size, window.width * 0.3) : 0
         visible: window.editing
     }
     PropertyBox {
         id: properties
         objectName: "properties"
-        anchors { right: parent.right; top: bar.bottom; bottom: status.top }
+        anchors { right: parent.right; top: bar.bottom; bottom: strip.top }
         width: visible ? Math.min(320 * Theme.size, window.width * 0.3) : 0
         visible: window.editing && program.selected
     }
     Item {
         id: stage_
         objectName: "stage"
-        anchors { left: catalogue.right; right: properties.left; top: bar.bottom; bottom: status.top }
+        anchors { left: catalogue.right; right: properties.left; top: bar.bottom; bottom: strip.top }
         // What is held behind the start page lets go; an item that is only hidden keeps the keyboard.
         enabled: visible
         visible: program.opened
@@ -66,6 +67,18 @@ Window {
         anchors { fill: stage_; margins: Theme.gap }
         visible: program.problem !== ""
         text: program.problem
+    }
+    RecordingStrip {
+        id: strip
+        objectName: "strip"
+        anchors { left: parent.left; right: parent.right; bottom: status.top }
+        visible: !program.kiosk && implicitHeight > 0
+        height: visible ? implicitHeight : 0
+    }
+    Connections {
+        target: program
+        function onRecordRequested() { strip.record() }
+        function onMarkRequested() { strip.mark() }
     }
     Rectangle {
         id: status

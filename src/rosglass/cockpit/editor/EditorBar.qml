@@ -5,6 +5,9 @@ import RosControls 1.0
 Rectangle {
     id: bar
 
+    // Seconds that have been recorded; negative while nothing is.
+    property real recordedSeconds: -1
+
     signal paletteWanted()
     signal fileWanted(string purpose)
     signal helpWanted()
@@ -51,6 +54,14 @@ Rectangle {
             Accessible.description: program.redoText
             onClicked: program.redo()
         }
+        ThemeButton {
+            objectName: "recordButton"
+            visible: program.opened && program.recording === ""
+            text: bar.recordedSeconds < 0 ? qsTr("Record") : qsTr("● Stop recording, %1 s").arg(bar.recordedSeconds.toFixed(0))
+            selected: bar.recordedSeconds >= 0
+            tint: Theme.bad
+            onClicked: program.run("record")
+        }
         ThemeButton { text: qsTr("Commands …"); objectName: "commands"; onClicked: bar.paletteWanted() }
     }
     ThemeText {
@@ -66,8 +77,8 @@ Rectangle {
         objectName: "robot"
         anchors { right: parent.right; rightMargin: Theme.gap; verticalCenter: parent.verticalCenter }
         visible: program.opened
-        text: program.connected ? qsTr("Robot") : qsTr("Find robot")
+        text: program.recording !== "" ? qsTr("Close recording") : program.connected ? qsTr("Robot") : qsTr("Find robot")
         tint: program.connected ? Theme.good : Theme.warn
-        onClicked: program.run("home")
+        onClicked: program.run(program.recording !== "" ? "close recording" : "home")
     }
 }

@@ -23,7 +23,7 @@ Rectangle {
 
             ThemeText {
                 width: parent.width
-                text: program.connected ? qsTr("Connected to %1").arg(program.url) : qsTr("Which robot?")
+                text: program.recording !== "" ? program.recording : program.connected ? qsTr("Connected to %1").arg(program.url) : qsTr("Which robot?")
                 font { pixelSize: 2 * Theme.large; weight: Font.DemiBold }
             }
             Column {
@@ -77,6 +77,7 @@ Rectangle {
                 }
                 ThemeButton { text: qsTr("Connect"); enabled: address.text !== ""; onClicked: program.connectTo(address.text) }
                 ThemeButton { objectName: "search"; text: program.searching ? qsTr("Searching …") : qsTr("Search again"); enabled: !program.searching; onClicked: program.searchRobots() }
+                ThemeButton { objectName: "openRecording"; text: qsTr("Open a recording …"); onClicked: page.fileWanted("open recording") }
                 ThemeButton { objectName: "tour"; text: qsTr("Try it on a simulated robot"); onClicked: program.startTour() }
             }
 
@@ -88,7 +89,7 @@ Rectangle {
                     spacing: Theme.gap
                     ThemeText {
                         anchors.verticalCenter: parent.verticalCenter
-                        text: qsTr("This robot offers data for %1 panels").arg(program.proposals.length)
+                        text: (program.recording !== "" ? qsTr("This recording has data for %1 panels") : qsTr("This robot offers data for %1 panels")).arg(program.proposals.length)
                         font { pixelSize: Theme.large; weight: Font.DemiBold }
                     }
                     ThemeButton { objectName: "addAll"; text: qsTr("Show all"); onClicked: program.addAll() }

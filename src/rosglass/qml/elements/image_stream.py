@@ -334,7 +334,8 @@ class SharedStream(QtCore.QObject):
             return
         for channel, picture in pending.pictures.items():
             channel.show(picture)
-        shown = Time.now()
+        # In a recording, times are recorded ones, and only the delay on the way is known.
+        shown = pending.received if hasattr(self._key[0], "playback") else Time.now()
         self._processing.append((shown - pending.received).seconds * 1000)
         if pending.stamp is not None:
             self._network.append((pending.received - pending.stamp).seconds * 1000)

@@ -10,14 +10,14 @@ import rosglass
 from rosglass.errors import Error
 from rosglass.qml.elements.element import Element
 from rosglass.qml.elements.singleton import strings
-from rosglass.qml.engine.properties import ReadOnly, Writable, report
+from rosglass.qml.engine.properties import ReadOnly, Writable, report, within
 from rosglass.qml.engine.session import result_of, weak_callback
 from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.bags import Playback
+    from rosglass.bags import Playback, TopicDensity
     from rosglass.comm.node import Node
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.qml.engine.session import Session
@@ -109,6 +109,8 @@ class Replay(Element):
     positionChanged = Signal()
     durationChanged = Signal()
     marksChanged = Signal()
+    rangeChanged = Signal()
+    densityChanged = Signal()
 
     file = Writable(
         str, "", lambda path: QtCore.QUrl(path).toLocalFile() if path[:5] == "file:" else path
@@ -132,6 +134,13 @@ class Replay(Element):
     ready = ReadOnly(bool, False)
     #: The event marks: ``{time, text}`` of each, in seconds from the beginning.
     marks = ReadOnly(QJSValue, read="_get_marks")
+    #: The part that is played, in seconds from the beginning.
+    rangeStart = ReadOnly(float, read=lambda self: self._range[0], notify="rangeChanged")
+    rangeEnd = ReadOnly(float, read=lambda self: self._range[1], notify="rangeChanged")
+    #: Number of parts in which messages are counted; 0 counts none.
+    parts = Writable(int, 0, within(0, 10_000), then="_on_parts")
+    #: ``{topic, type, count}`` of each recorded topic, once its messages are counted.
+    density = ReadOnly(QJSValue, read="_get_density")
 
     _HOLDS = ("_playback",)
     _topics: tuple[str, ...]
@@ -151,6 +160,9 @@ class Replay(Element):
         self._user = object()
         self._playback: Playback | None = None
         self._marks: list[tuple[float, str]] = []
+        self._range = (0.0, 0.0)
+        self._density: list[TopicDensity] = []
+        self._ended = threading.Event()
 
     def _get_rate(self) -> float:
         if self._playback is not None:
@@ -196,6 +208,22 @@ class Replay(Element):
             return QJSValue()
         return runtime.value([{"time": time, "text": text} for time, text in self._marks])
 
+    def _get_density(self) -> QJSValue:
+        runtime = self._find_runtime()
+        if runtime is None:
+            return QJSValue()
+        return runtime.value(
+            [
+                {"topic": one.topic, "type": one.type_name, "count": one.count}
+                for one in self._density
+            ]
+        )
+
+    @Slot(int, result="QVariantList")
+    def partsOf(self, index: int) -> list[int]:  # noqa: N802 - QML's name
+        """Return the messages in each part of the recording, of a topic of `density`."""
+        return list(self._density[index].parts) if 0 <= index < len(self._density) else []
+
     # Controlling.
 
     @Slot()
@@ -215,6 +243,27 @@ class Replay(Element):
         runtime = self._find_runtime()
         if problem and runtime is not None:
             runtime.throw(f"Replay.seek: {problem}")
+
+    @Slot()
+    def step(self) -> None:
+        """Play the next message, and pause."""
+        if self._playback is not None:
+            self._wanted_playing = False
+            self._playback.step()
+
+    @Slot(float, float)
+    def setRange(self, start: float, end: float) -> None:  # noqa: N802 - QML's name
+        """Play and repeat a part only, in seconds; an invalid one throws."""
+        if self._playback is None:
+            return
+        try:
+            self._playback.set_range(start, end)
+        except Error as error:
+            runtime = self._find_runtime()
+            if runtime is not None:
+                runtime.throw(f"Replay.setRange: {error}")
+            return
+        self._refresh()
 
     def _seek(self, seconds: float) -> str:
         """Jump to a position; return why this is impossible, or an empty text."""
@@ -296,6 +345,7 @@ class Replay(Element):
             self._set_position(position)
         self._play_or_pause()
         self._read_marks(playback)
+        self._count_messages()
         report(self, ready=True)
 
     def _on_closed(self, endpoint: Playback | None) -> None:  # noqa: ARG002 - the base's signature
@@ -303,6 +353,8 @@ class Replay(Element):
         if playback is not None:
             self._refresh()
             self._show_marks(None, [])
+            self._ended.set()
+            self._show_density(None, [])
             report(self, ready=False)
 
     def _read_marks(self, playback: Playback) -> None:
@@ -321,6 +373,34 @@ class Replay(Element):
         if is_alive(self) and playback is self._playback and marks != self._marks:
             self._marks = marks
             self.marksChanged.emit()
+
+    def _on_parts(self) -> None:
+        self._count_messages()
+
+    def _count_messages(self) -> None:
+        """Count messages in a thread of its own: without an index, that takes long."""
+        self._ended.set()
+        playback, parts = self._playback, self.parts
+        if playback is None or self._session is None or parts == 0:
+            self._show_density(playback, [])
+            return
+        self._ended = ended = threading.Event()
+        post, show = self._session.executor.post, weak_callback(self._show_density)
+
+        def count() -> None:
+            found = result_of(
+                lambda: rosglass.bags.read_density(playback.path, parts, ended),
+                "counting messages",
+            )
+            if not isinstance(found, Error) and not ended.is_set():
+                post(lambda: show(playback, found))
+
+        threading.Thread(target=count, name="density of a recording", daemon=True).start()
+
+    def _show_density(self, playback: Playback | None, density: list[TopicDensity]) -> None:
+        if is_alive(self) and playback is self._playback and density != self._density:
+            self._density = density
+            self.densityChanged.emit()
 
     # Watching.
 
@@ -347,11 +427,15 @@ class Replay(Element):
         elif self._session is not None and self._session.state == "failed":
             self._set_problem(self._session.detail)
         self._state = now
+        part = playback.range if playback is not None else (0.0, 0.0)
+        moved, self._range = part != self._range, part
         ended = playback is not None and before[0] and playback.is_at_end
         if ended:
             self._wanted_playing = None
         if before[2] != now[2]:
             self.durationChanged.emit()
+        if moved:
+            self.rangeChanged.emit()
         if before[1] != now[1]:
             self.positionChanged.emit()
         if before[0] != now[0]:
