@@ -72,7 +72,7 @@ Window {
         id: strip
         objectName: "strip"
         anchors { left: parent.left; right: parent.right; bottom: status.top }
-        visible: !program.kiosk && implicitHeight > 0
+        visible: !program.kiosk && used
         height: visible ? implicitHeight : 0
     }
     Connections {

@@ -7,6 +7,9 @@ Rectangle {
 
     readonly property alias recording: recorder.recording
     readonly property alias elapsed: recorder.elapsed
+    // Whether there is anything to show.
+    readonly property bool used: program.recording !== "" || usesRecorder_
+    readonly property bool usesRecorder_: recorder.recording || recorder.completing || opened_
     // Whether the recorder stays although it does not record.
     property bool opened_: false
 
@@ -22,7 +25,7 @@ Rectangle {
             program.say(qsTr("mark %1 written").arg(recorder.markCount))
     }
 
-    implicitHeight: column.height > 0 ? column.height + Theme.gap : 0
+    implicitHeight: column.height + Theme.gap
     color: Theme.background
     Accessible.role: Accessible.Pane
     Accessible.name: qsTr("Recording")
@@ -50,7 +53,7 @@ Rectangle {
             id: box
             objectName: "recorderBox"
             width: parent.width
-            visible: recorder.recording || recorder.completing || strip.opened_
+            visible: strip.usesRecorder_
             height: visible ? Math.max(recorder.implicitHeight, limits.height) : 0
             Rectangle {
                 anchors { fill: parent; margins: -Theme.gap / 4 }
