@@ -367,3 +367,44 @@ def test_an_input_beside_the_pages_halts_until_it_is_let_go(layouts: Any, change
     assert not root.property("driving")
     layouts.wait(is_driving)
     subscription.close()
+
+
+def test_the_program_ends_with_the_main_window(start: Any, tmp_path: Any) -> None:
+    file = tmp_path / "layout.qml"
+    file.write_text(
+        """import QtQuick 2.15
+        import QtQuick.Window 2.15
+        import RosCockpit 1.0
+        Cockpit {
+            id: root_
+            Page { Panel { Item {} } Panel { id: other; Item {} } }
+            PanelWindow { id: second; title: "second"; Panel { Item {} } }
+            Timer {
+                interval: 100; repeat: true; running: true
+                onTriggered: {
+                    if (!other.detached)
+                        other.detach()
+                    else if (second.holder_.Window.window.visible)
+                        root_.Window.window.close()
+                }
+            }
+        }"""
+    )
+    program = start("run", file, "--url", "local://x")
+    assert program.end(30) == 0, program.text
+
+
+def test_a_closed_window_is_opened_by_the_bar(layouts: Any) -> None:
+    from rosglass.qt import QtGui
+
+    layouts.show(f'Page {{ {panel("a")} }} PanelWindow {{ title: "Second"; {panel("b")} }}')
+    window = next(one for one in QtGui.QGuiApplication.topLevelWindows() if one.title() == "Second")
+    layouts.wait(window.isExposed)
+    assert not layouts.find("pageBar").isVisible()
+    window.close()
+    layouts.wait(lambda: layouts.search("window0") is not None)
+    assert layouts.find("window0").property("text") == "Second"
+    layouts.wait(lambda: layouts.find("window0").property("width") > 0)
+    layouts.click("window0")
+    layouts.wait(window.isExposed)
+    layouts.wait(lambda: not layouts.find("pageBar").isVisible())

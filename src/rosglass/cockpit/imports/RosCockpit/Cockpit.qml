@@ -195,7 +195,7 @@ Item {
         objectName: "pageBar"
         anchors { left: parent.left; right: parent.right; top: parent.top }
         height: visible ? implicitHeight : 0
-        visible: cockpit.pages.length > 1 || cockpit.editing
+        visible: cockpit.pages.length > 1 || cockpit.editing || closed_.length > 0
         cockpit: cockpit
     }
     Loader {

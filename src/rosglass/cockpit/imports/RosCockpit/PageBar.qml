@@ -6,6 +6,8 @@ Rectangle {
     id: bar
 
     property Item cockpit: null
+    // Windows that were closed.
+    readonly property var closed_: cockpit ? cockpit.windows.filter(one => !one.open) : []
 
     implicitHeight: Theme.touch + 1
     color: Theme.panel
@@ -52,6 +54,19 @@ Rectangle {
                         item.index = index
                     }
                 }
+            }
+        }
+    }
+    Row {
+        anchors { right: parent.right; rightMargin: Theme.gap / 2; top: parent.top; bottom: parent.bottom; bottomMargin: 1 }
+        Repeater {
+            model: bar.closed_
+            TabButton {
+                objectName: "window" + index
+                height: row.height
+                text: modelData.title || qsTr("Window")
+                name: qsTr("Show the window %1 again").arg(modelData.title)
+                onClicked: modelData.open = true
             }
         }
     }

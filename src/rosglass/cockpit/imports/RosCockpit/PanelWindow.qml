@@ -18,7 +18,7 @@ Item {
     // Fills the screen, without a frame.
     property bool fullScreen: false
     property int orientation: Qt.Horizontal
-    // Whether it is shown. Closed by its frame, it opens again with the layout.
+    // Whether it is shown. Closed by its frame, it is opened by a button on the bar of pages.
     property bool open: true
     // The screen it is on, and what is wrong with that; empty if it is the one that was asked for.
     readonly property string onScreen: screen_ ? screen_.name : ""
