@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import logging
+from functools import cache
+from importlib.util import find_spec
 from typing import Any
 
 from rosglass.qml.engine.log import log_from_qml
@@ -11,12 +13,20 @@ from rosglass.qml.engine.properties import Writable, within
 from rosglass.qml.engine.runtime import runtime_of
 from rosglass.qt import QT6, Property, QtCore, Slot, is_alive, optional
 
-__all__ = ["MULTIMEDIA", "DepthImageProcessor"]
+__all__ = ["DepthImageProcessor", "has_multimedia"]
 
-#: QtMultimedia of Qt 6; None without it.
-MULTIMEDIA: Any = optional("QtMultimedia") if QT6 else None
 #: Depths in metres up to this are taken for "no limit".
 _NO_LIMIT = 0.001
+
+
+def has_multimedia() -> bool:
+    """Return whether QtMultimedia of Qt 6 is installed; it is not loaded, which takes long."""
+    return QT6 and find_spec("PySide6.QtMultimedia") is not None
+
+
+@cache
+def _multimedia() -> Any:
+    return optional("QtMultimedia")
 
 
 class DepthImageProcessor(QtCore.QObject):
@@ -33,7 +43,7 @@ class DepthImageProcessor(QtCore.QObject):
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
-        self._sink: Any = MULTIMEDIA.QVideoSink(self)
+        self._sink: Any = _multimedia().QVideoSink(self)
         self._sink.videoFrameChanged.connect(self._show)
         self._grabbed: Any = None
         state = self.__dict__
@@ -72,7 +82,7 @@ class DepthImageProcessor(QtCore.QObject):
         if not is_alive(output) or not is_alive(self._sink):
             return
         frame = self._sink.videoFrame()
-        depths = MULTIMEDIA.QVideoFrameFormat.PixelFormat.Format_Y16
+        depths = _multimedia().QVideoFrameFormat.PixelFormat.Format_Y16
         if frame.isValid() and frame.pixelFormat() == depths and self.maxDepth > _NO_LIMIT:
             frame = _greys(frame, self.maxDepth)
         output.setVideoFrame(frame)
@@ -92,7 +102,8 @@ def _greys(frame: Any, most: float) -> Any:
     """Return a frame of depths in millimetres as one of greys, with white for `most` metres."""
     import numpy as np  # noqa: PLC0415 - slow to import
 
-    modes, formats = MULTIMEDIA.QVideoFrame.MapMode, MULTIMEDIA.QVideoFrameFormat
+    multimedia = _multimedia()
+    modes, formats = multimedia.QVideoFrame.MapMode, multimedia.QVideoFrameFormat
     if not frame.map(modes.ReadOnly):
         return frame
     try:
@@ -102,7 +113,7 @@ def _greys(frame: Any, most: float) -> Any:
         # By a table: an image has more pixels than there are depths.
         levels = np.minimum(255, 1 + np.arange(65536) * (254 / (most * 1000))).astype(np.uint8)
         levels[0] = 0
-        made = MULTIMEDIA.QVideoFrame(formats(size, formats.PixelFormat.Format_Y8))
+        made = multimedia.QVideoFrame(formats(size, formats.PixelFormat.Format_Y8))
         if not made.map(modes.WriteOnly):
             return frame
         try:

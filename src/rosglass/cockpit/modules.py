@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from rosglass.cockpit.depth_image_processor import MULTIMEDIA, DepthImageProcessor
+from rosglass.cockpit.depth_image_processor import DepthImageProcessor, has_multimedia
 from rosglass.cockpit.icon_font import IconFontFile
 from rosglass.cockpit.plugin_loader import PluginLoader
 from rosglass.controls import modules as controls
@@ -29,5 +29,5 @@ def register() -> None:
     controls.register()
     for name, kind in TYPES.items():
         register_class(kind, "RosCockpit", name)
-    if MULTIMEDIA is not None:
+    if has_multimedia():
         register_class(DepthImageProcessor, "RQml.DefaultPlugins", "DepthImageProcessor")
