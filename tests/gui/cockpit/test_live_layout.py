@@ -107,7 +107,10 @@ class Stage:
         return self.live.item_of(self.panel(title))
 
     def find(self, name: str) -> Any:
-        waiting = [self.window.contentItem()]
+        return self.find_in(self.window, name)
+
+    def find_in(self, window: Any, name: str) -> Any:
+        waiting = [window.contentItem()]
         while waiting:
             one = waiting.pop()
             if one.objectName() == name:
@@ -504,3 +507,21 @@ def test_a_layout_fills_its_container(stage: Stage) -> None:
     assert stage.live.root.width() == 310
     stage.window.contentItem().setSize(QtCore.QSizeF(600, 400))
     assert stage.live.root.width() == 310
+
+
+def test_a_window_closed_in_edit_mode_gives_its_panels_back(stage: Stage) -> None:
+    from rosglass.qt import QtGui
+
+    stage.live.edited.connect(lambda _, document: stage.live.show(document))
+    assert stage.edit(lambda edits: edits.to_window(stage.panel("A"), "", 0, 0, 300, 200))
+    root = stage.live.root
+    root.setProperty("editing", True)
+    window = next(one for one in QtGui.QGuiApplication.topLevelWindows() if one.title() == "A")
+    stage.wait(window.isExposed)
+    mark = stage.find_in(window, "mark_a")
+    window.close()
+    stage.wait(lambda: "PanelWindow" not in stage.document.text)
+    root.setProperty("pageIndex", 1)
+    stage.wait(lambda: stage.find("mark_a") is mark)
+    assert mark.isVisible()
+    assert stage.counts() == (5, 0)
