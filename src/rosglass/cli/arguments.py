@@ -353,10 +353,11 @@ def _cockpit(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         nargs="?",
         default="",
-        help="the layout (.qml; package://name/path for a file in a package) or the recording "
-        "(.mcap, .bag, .db3) to open (default: a page with the robots found)",
+        help="the layout (.qml; package://name/path for a file in a package; also one of Foxglove, "
+        ".json, or RQml, .rqml) or the recording (.mcap, .bag, .db3) to open (default: a page with "
+        "the robots found)",
     )
-    complete(layout, "*.qml *.mcap *.bag *.db3")
+    complete(layout, "*.qml *.json *.rqml *.mcap *.bag *.db3")
     _add_robot_url(parser)
     parser.add_argument(
         "--panels",

@@ -20,6 +20,7 @@ from rosglass.cockpit.first_layout import empty_layout, first_layout, panel_text
 from rosglass.cockpit.history import History
 from rosglass.cockpit.layout_edits import LayoutEdits
 from rosglass.cockpit.layout_file import LayoutFile, Recovery, state_folder
+from rosglass.cockpit.layout_imports import import_layout, is_foreign
 from rosglass.cockpit.live_layout import LiveLayout
 from rosglass.cockpit.panels import Panel, Proposal, controls, find, folder_panels, propose, search
 from rosglass.cockpit.property_form import PropertyModel
@@ -55,6 +56,8 @@ _FOLLOWED = "rosglass_followed"
 _MAX_RECENT = 8
 #: Senders that a question lists.
 _MAX_SENDERS = 8
+#: Lines of a list of what was not imported that are shown.
+_MAX_LEFT_OUT = 12
 #: Address of the robot of the tour, and the port of its router.
 _TOUR_URL = "zenoh://127.0.0.1:7457"
 
@@ -152,6 +155,7 @@ class CockpitProgram(QtCore.QObject):
         plugins = find_plugins(os.environ, panels)
         for problem in plugins.problems:
             _log.warning("%s", problem)
+        self._plugin_names = {plugin.id: plugin.name for plugin in plugins.plugins}
         for plugin in plugins.plugins:
             self._panels.append(_plugin_panel(plugin))
             self._titles.append(plugin.name)
@@ -497,6 +501,9 @@ class CockpitProgram(QtCore.QObject):
 
     def _open(self, path: Path) -> None:
         try:
+            if is_foreign(path):
+                self._import(path)
+                return
             file = LayoutFile.open(path)
             document = Document(file.text, str(path))
         except Error as error:
@@ -523,6 +530,22 @@ class CockpitProgram(QtCore.QObject):
             ],
             lambda index: self._decide_on(index, file, document),
         )
+
+    def _import(self, path: Path) -> None:
+        """Show a layout of another program as a new one, and list what is not as it was there."""
+        imported = import_layout(path, self._plugin_names)
+        self._begin(imported.text, path.stem)
+        for line in imported.left_out:
+            _log.warning("%s: %s", path, line)
+        if imported.left_out:
+            lines = [f"• {line}" for line in imported.left_out[:_MAX_LEFT_OUT]]
+            if len(imported.left_out) > _MAX_LEFT_OUT:
+                more = len(imported.left_out) - _MAX_LEFT_OUT
+                lines.append(self.tr("and {} more, which are logged").format(more))
+            text = self.tr("This layout of {} was read, except for:").format(imported.program)
+            self._ask("\n".join([text, *lines]), [self.tr("Go on")], lambda _: None)
+        else:
+            self.say(self.tr("this layout of {} was read").format(imported.program))
 
     def _decide_on(self, index: int, file: LayoutFile, document: Document) -> None:
         if index == 2:
@@ -561,14 +584,13 @@ class CockpitProgram(QtCore.QObject):
             self.say(str(error))
 
     def _start(self, text: str, name: str) -> None:
-        """Show a layout that has no file yet."""
+        """Show a layout that has no file yet, in the place of the present one."""
+        self._leave(lambda: self._begin(text, name))
 
-        def start() -> None:
-            self._file = None
-            self._show_layout(Document(text, name), name)
-            self._edit_mode(True)
-
-        self._leave(start)
+    def _begin(self, text: str, name: str) -> None:
+        self._file = None
+        self._show_layout(Document(text, name), name)
+        self._edit_mode(True)
 
     def _show_layout(self, document: Document, name: str) -> None:
         assert self._session is not None

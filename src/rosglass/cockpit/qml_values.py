@@ -42,7 +42,7 @@ _WORDS = {
     "Infinity": math.inf,
     "-Infinity": -math.inf,
 }
-_NAME = re.compile(r"[A-Za-z_$][\w$]*")
+_NAME = re.compile(r"[A-Za-z_$][\w$]*", re.ASCII)
 
 
 class Code(str):

@@ -157,3 +157,45 @@ def test_layout_of_a_stranger_is_opened_once_it_is_agreed_to(
     again = edit(file)
     again.wait(lambda: again.program.property("opened"))
     assert again.program.property("question") == ""
+
+
+def test_layout_of_foxglove_becomes_a_new_one(edit: Callable[..., Any], tmp_path: Path) -> None:
+    evil = '"; Component.onCompleted: Qt.quit(); title: "'
+    configs = {
+        "RawMessages!a": {"topicPath": "/odom", "foxglovePanelTitle": evil},
+        "Audio!b": {},
+        "Indicator!c": {"path": "/a.data", "fallbackLabel": "dark"},
+        "Teleop!d": {"topic": "/cmd_vel"},
+    }
+    layout: Any = "RawMessages!a"
+    for name in list(configs)[1:]:
+        layout = {"direction": "row", "first": layout, "second": name}
+    file = tmp_path / "desk.json"
+    file.write_text(json.dumps({"configById": configs, "layout": layout}))
+    editor = edit(file)
+    editor.wait(lambda: editor.program.question)
+    assert editor.program.question == (
+        "This layout of Foxglove was read, except for:\n• Audio: there is no such panel here"
+    )
+    editor.program.answer(0)
+    assert [one.property("title") for one in editor.root.panels().toVariant()] == [
+        *(evil, "Lamp", "Drive stick")
+    ]
+    assert editor.program.problem == ""
+    # It has no file: the one that was read stays as it is.
+    assert editor.program.path == ""
+    assert editor.program.modified
+    assert editor.program.editing
+    assert not editor.program.save("")
+
+
+def test_broken_layout_of_foxglove_is_refused(edit: Callable[..., Any], file: Path) -> None:
+    editor = edit(file)
+    editor.wait(lambda: editor.program.opened)
+    other = file.with_suffix(".json")
+    other.write_text('{"configById": {')
+    editor.program.open(str(other))
+    assert "layout.json:1:17: this is not JSON" in editor.program.problem.replace(
+        file.stem, "layout"
+    )
+    assert editor.text == LAYOUT

@@ -17,7 +17,7 @@ FileDialog {
         title = purpose === "save as" ? qsTr("Save the layout") : purpose === "open recording" ? qsTr("Open a recording") : qsTr("Open a layout")
         nameFilters = purpose === "open recording" ? [qsTr("Recordings (*.mcap *.bag *.db3 *.yaml)"), qsTr("All files (*)")]
             : purpose === "save as" ? [qsTr("Layouts (*.qml)")]
-            : [qsTr("Layouts (*.qml *.json)"), qsTr("All files (*)")]
+            : [qsTr("Layouts (*.qml *.json *.rqml)"), qsTr("All files (*)")]
         defaultSuffix = purpose === "save as" ? "qml" : ""
         currentFolder = program.folder
         if (purpose === "save as")
