@@ -19,7 +19,7 @@ class History:
     """
 
     def __init__(self, text: str, most_bytes: int = 32 * 1024 * 1024) -> None:
-        self._text = self._saved = text
+        self._text = text
         self._most_bytes = most_bytes
         self._done: list[_Change] = []
         self._undone: list[_Change] = []
@@ -28,11 +28,6 @@ class History:
     def text(self) -> str:
         """The text as it is now."""
         return self._text
-
-    @property
-    def modified(self) -> bool:
-        """True if the text differs from the one that was saved last."""
-        return self._text != self._saved
 
     @property
     def undo_name(self) -> str:
@@ -81,10 +76,6 @@ class History:
             self._done.append(change)
             self._text = change.applied(self._text)
         return self._text
-
-    def mark_saved(self) -> None:
-        """Note that the text is saved."""
-        self._saved = self._text
 
 
 class _Change(NamedTuple):

@@ -52,6 +52,8 @@ WINDOW = Path(__file__).with_name("editor") / "Editor.qml"
 _MESSAGE_S, _LOOK_S = 10.0, 1.0
 #: Dynamic property of plugins whose context is kept.
 _FOLLOWED = "rosglass_followed"
+#: Name under which a layout that has no file yet is kept for a recovery.
+_UNSAVED = "unsaved.qml"
 #: Files opened lately that are remembered.
 _MAX_RECENT = 8
 #: Senders that a question lists.
@@ -487,6 +489,29 @@ class CockpitProgram(QtCore.QObject):
             self._open_recording(self._url_given)
         elif self._to_open is None:
             self.searchRobots()
+            self._recover_new()
+
+    def _recover_new(self) -> None:
+        """Offer a layout that never had a file, if the cockpit ended before it was saved."""
+        unsaved = self._state / _UNSAVED
+        text = Recovery.find(unsaved)
+        if text is None:
+            return
+
+        def decide(index: int) -> None:
+            if index == 1:
+                Recovery.drop(unsaved)
+                return
+            name = self.tr("Cockpit")
+            if self._try(lambda: Document(text, name)):
+                self._start(text, name)
+                self._keep_recovery()
+
+        self._ask(
+            self.tr("The cockpit ended before a new layout was saved."),
+            [self.tr("Restore it"), self.tr("Discard it")],
+            decide,
+        )
 
     def _keep_closed(self) -> None:
         """Offer robots, unless there is a layout to go on with."""
@@ -702,11 +727,16 @@ class CockpitProgram(QtCore.QObject):
             self,
             opened=self._has_layout() and not self._at_home,
             hasLayout=self._has_layout(),
-            modified=self._has_layout() and (history.modified or self._file is None),
+            modified=self._is_modified(),
             undoText=history.undo_name,
             redoText=history.redo_name,
         )
         self._show_selected()
+
+    def _is_modified(self) -> bool:
+        """Return whether the layout has another text than its file, or no file."""
+        file = self._file
+        return self._has_layout() and (file is None or file.text != self._history.text)
 
     def _has_layout(self) -> bool:
         return self._live is not None and self._live.document is not None
@@ -727,9 +757,12 @@ class CockpitProgram(QtCore.QObject):
             self._keep_recovery()
 
     def _keep_recovery(self) -> None:
-        path = Path(self.path) if self.path else self._state / "unsaved.qml"
+        path = Path(self.path) if self.path else self._state / _UNSAVED
         try:
-            Recovery.keep(path, self._history.text)
+            if self._is_modified():
+                Recovery.keep(path, self._history.text)
+            else:
+                Recovery.drop(path)
         except Error as error:
             self.say(str(error))
 
@@ -994,7 +1027,6 @@ class CockpitProgram(QtCore.QObject):
         except Error as error:
             self.say(str(error))
             return False
-        self._history.mark_saved()
         Recovery.drop(self._file.path)
         saved = self._file.path
         self._try(lambda: self._trusted.trust(saved, text))
@@ -1007,7 +1039,7 @@ class CockpitProgram(QtCore.QObject):
     @Slot()
     def discard(self) -> None:
         """Forget changes that are not saved."""
-        Recovery.drop(Path(self.path) if self.path else self._state / "unsaved.qml")
+        Recovery.drop(Path(self.path) if self.path else self._state / _UNSAVED)
 
     def _leave(self, go_on: Callable[[], None]) -> None:
         """Go on to another layout, once the user has decided on changes of this one."""
@@ -1104,9 +1136,6 @@ class CockpitProgram(QtCore.QObject):
         if not conflicts:
             file.accept(theirs)
             self._apply(self.tr("Changes from outside"), document)
-            if merged == theirs:
-                self._history.mark_saved()
-                self._refresh()
             self.say(self.tr("{} was changed by another program; merged").format(file.path.name))
             return
 
@@ -1114,8 +1143,6 @@ class CockpitProgram(QtCore.QObject):
             file.accept(theirs)
             if index == 0:
                 self._apply(self.tr("Changes from outside"), Document(theirs, str(file.path)))
-                self._history.mark_saved()
-                self._refresh()
 
         self._ask(
             self.tr("{} was changed by another program, in the same lines as here.").format(

@@ -898,6 +898,18 @@
         <translation>Cockpit</translation>
     </message>
     <message>
+        <source>The cockpit ended before a new layout was saved.</source>
+        <translation>Das Cockpit endete, bevor ein neues Layout gespeichert war.</translation>
+    </message>
+    <message>
+        <source>Restore it</source>
+        <translation>Wiederherstellen</translation>
+    </message>
+    <message>
+        <source>Discard it</source>
+        <translation>Verwerfen</translation>
+    </message>
+    <message>
         <source>Add {}</source>
         <translation>{} hinzufügen</translation>
     </message>
@@ -1723,10 +1735,6 @@
     <message>
         <source>set path: &quot;topic:field&quot;, or drop a field here</source>
         <translation>path setzen: &quot;topic:feld&quot;, oder ein Feld hier ablegen</translation>
-    </message>
-    <message>
-        <source>tint is &quot;good&quot;, &quot;warn&quot;, &quot;bad&quot; or &quot;accent&quot;, not &quot;%1&quot;</source>
-        <translation>tint ist &quot;good&quot;, &quot;warn&quot;, &quot;bad&quot; oder &quot;accent&quot;, nicht &quot;%1&quot;</translation>
     </message>
     <message>
         <source>not a number</source>

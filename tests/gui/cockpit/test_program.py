@@ -130,6 +130,38 @@ def test_changes_survive_a_crash(edit: Callable[..., Any], file: Path) -> None:
     again.wait(lambda: "Energy" in again.text)
 
 
+def test_new_layout_survives_a_crash(edit: Callable[..., Any]) -> None:
+    editor = edit()
+    editor.click("new")
+    editor.wait(lambda: editor.program.property("opened"))
+    editor.program.run("add page")
+    text = editor.text
+    again = edit()
+    again.answer(0)
+    again.wait(lambda: again.program.property("opened"))
+    assert again.text == text
+    assert again.program.property("modified")
+    again.program.discard()
+    assert edit().program.property("question") == ""
+
+
+def test_change_of_another_program_leaves_nothing_to_recover(
+    edit: Callable[..., Any], file: Path
+) -> None:
+    editor = edit(file)
+    editor.wait(lambda: editor.program.property("opened"))
+    file.write_text(LAYOUT.replace('"Lean"', '"Horizon"'))
+    editor.wait(lambda: "Horizon" in editor.text)
+    assert not editor.program.property("modified")
+    editor.program.undo()
+    assert editor.program.property("modified"), "the file has another text"
+    editor.program.redo()
+    file.write_text(LAYOUT)
+    again = edit(file)
+    again.wait(lambda: again.program.property("opened"))
+    assert again.program.property("question") == ""
+
+
 def test_help_of_a_panel_opens_its_page(edit: Callable[..., Any], file: Path) -> None:
     editor = edit(file)
     editor.wait(lambda: editor.program.property("opened"))
