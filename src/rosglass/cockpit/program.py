@@ -28,13 +28,14 @@ from rosglass.cockpit.qml_document import Code, Document, to_qml
 from rosglass.cockpit.recordings import SCHEME, Examined, examine, is_recording, path_of
 from rosglass.cockpit.robots import FoundRobot, RobotSearch, addresses
 from rosglass.cockpit.rqml import RqmlPlugin, find_plugins
+from rosglass.cockpit.rqml_api import RqmlApi
 from rosglass.cockpit.trust import TrustedLayouts, senders
 from rosglass.errors import Error
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qml.engine.runtime import runtime_of
 from rosglass.qml.run.modules import locate
 from rosglass.qml.run.renderer_choice import choice
-from rosglass.qt import QtCore, QtGui, Signal, Slot, is_alive
+from rosglass.qt import QtCore, QtGui, QtQml, Signal, Slot, is_alive
 from rosglass.wires.zenoh.options import shown_url
 
 if TYPE_CHECKING:
@@ -158,7 +159,11 @@ class CockpitProgram(QtCore.QObject):
         for problem in plugins.problems:
             _log.warning("%s", problem)
         self._plugin_names = {plugin.id: plugin.name for plugin in plugins.plugins}
+        #: Id of a plugin of RQml -> its place in the catalogue.
+        self._plugins: dict[str, int] = {}
+        self._plugin_folders = [os.fspath(place) for place in panels]
         for plugin in plugins.plugins:
+            self._plugins[plugin.id] = len(self._panels)
             self._panels.append(_plugin_panel(plugin))
             self._titles.append(plugin.name)
         self._recording_url, self._robot_url = "", ""
@@ -174,6 +179,7 @@ class CockpitProgram(QtCore.QObject):
         self._session: Session | None = None
         self._window: Any = None
         self._stage: Any = None
+        self._plugin_engine: Any = None
         self._file: LayoutFile | None = None
         self._history = History("")
         self._live: LiveLayout | None = None
@@ -646,7 +652,23 @@ class CockpitProgram(QtCore.QObject):
         root.setProperty("editing", self.editing)
         root.currentChanged.connect(self._show_selected)
         root.helpRequested.connect(self._on_help_requested)
+        engine = QtQml.qmlEngine(root)
+        if engine is not None and engine is not self._plugin_engine:
+            self._plugin_engine, api = engine, RqmlApi.of(engine)
+            api.folders = self._plugin_folders
+            # Later: the layout changes while the plugin's handler runs.
+            api.pluginRequested.connect(
+                self._on_plugin_requested, QtCore.Qt.ConnectionType.QueuedConnection
+            )
         self._show_selected()
+
+    @Slot(str)
+    def _on_plugin_requested(self, plugin: str) -> None:
+        """Add a plugin of RQml that another one asks for; Undo takes it away again."""
+        if self.kiosk:
+            self.say(self.tr("A plugin asks for {}: a kiosk's layout stays").format(plugin))
+        elif plugin in self._plugins:
+            self.add(self._plugins[plugin])
 
     def _on_help_requested(self, item: Any) -> None:
         live = self._live

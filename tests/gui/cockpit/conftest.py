@@ -109,14 +109,16 @@ def layouts(running: Any, wait: Callable[..., None]) -> LayoutBench:
 class Editor:
     """The editor's window, on a robot made of memory."""
 
-    def __init__(self, running: Any, wait: Any, layout: str | Path = "") -> None:
+    def __init__(
+        self, running: Any, wait: Any, layout: str | Path = "", panels: tuple[Path, ...] = ()
+    ) -> None:
         from rosglass.cockpit.modules import register
         from rosglass.cockpit.program import WINDOW, CockpitProgram
         from rosglass.qt import QtCore, QtQml
 
         register()
         self.bench, self.wait = running, wait
-        self.program: Any = CockpitProgram(layout)
+        self.program: Any = CockpitProgram(layout, panels=panels)
         running.engine.rootContext().setContextProperty("program", self.program)
         component = QtQml.QQmlComponent(running.engine, QtCore.QUrl.fromLocalFile(str(WINDOW)))
         self.window: Any = component.create()
@@ -205,8 +207,8 @@ def edit(
     monkeypatch.setenv("ROSGLASS_URL", "local://empty")
     made: list[Editor] = []
 
-    def start(layout: str | Path = "") -> Editor:
-        made.append(Editor(running, wait, layout))
+    def start(layout: str | Path = "", panels: tuple[Path, ...] = ()) -> Editor:
+        made.append(Editor(running, wait, layout, panels))
         return made[-1]
 
     yield start

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -11,7 +12,6 @@ pytest.importorskip("PySide6", reason="the editor needs Qt 6")
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
 LAYOUT = """import QtQuick 2.15
 import Ros2 1.0
@@ -62,6 +62,20 @@ def test_start_page_makes_a_layout(edit: Callable[..., Any]) -> None:
     assert "Battery {}" not in editor.text
     editor.click("redo")
     assert "Battery {}" in editor.text
+
+
+def test_a_plugin_of_rqml_shows_another_one(edit: Callable[..., Any]) -> None:
+    from rosglass.cockpit.rqml_api import RqmlApi
+    from rosglass.qt import QtQml
+
+    editor = edit(panels=(Path(__file__).with_name("rqml_plugins"),))
+    editor.click("new")
+    editor.wait(lambda: editor.program.property("opened"))
+    RqmlApi.of(QtQml.qmlEngine(editor.root)).createPlugin("robot_panels.counter")
+    editor.wait(lambda: "Counter.qml" in editor.text)
+    assert editor.program.property("undoText") == "Add Counter"
+    editor.click("undo")
+    assert "Counter.qml" not in editor.text
 
 
 def test_property_is_changed_on_its_own_line(edit: Callable[..., Any], file: Path) -> None:
