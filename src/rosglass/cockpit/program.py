@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import posixpath
 import subprocess
 import sys
 import threading
@@ -61,6 +62,8 @@ _MAX_RECENT = 8
 _MAX_SENDERS = 8
 #: Lines of a list of what was not imported that are shown.
 _MAX_LEFT_OUT = 12
+#: File of the state folder that says that the tour was shown.
+_HINTS_SEEN = "tour_seen"
 #: Address of the robot of the tour, and the port of its router.
 _TOUR_URL = "zenoh://127.0.0.1:7457"
 
@@ -138,6 +141,12 @@ class CockpitProgram(QtCore.QObject):
     #: The recorder is to start or stop, and to write a mark.
     recordRequested = Signal()
     markRequested = Signal()
+    #: Whether the tour is shown: at the first start, and when it is asked for.
+    hints = ReadOnly(bool, False)
+
+    #: The keyboard is wanted in the "catalogue" or the "form".
+    focusWanted = Signal(str)
+
     _found = Signal(object)
     _examined = Signal(object)
 
@@ -193,6 +202,7 @@ class CockpitProgram(QtCore.QObject):
         self._trusted = TrustedLayouts()
         self._found.connect(self._on_found)
         self._examined.connect(self._on_examined)
+        self._page = ""
         self._timer = QtCore.QTimer(self)
         self._timer.setInterval(round(_LOOK_S * 1000))
         self._timer.timeout.connect(self._look)
@@ -489,6 +499,7 @@ class CockpitProgram(QtCore.QObject):
         self._list_catalogue()
         self._timer.start()
         self._look()
+        report(self, hints=not (self._state / _HINTS_SEEN).exists())
         if self._to_open is not None:
             self.open(str(self._to_open))
         if self._url_given.startswith(SCHEME):
@@ -896,6 +907,16 @@ class CockpitProgram(QtCore.QObject):
                 _Command(self.tr("Mark this moment in the recording"), "Ctrl+M"),
                 self.markRequested.emit,
             ),
+            "catalogue": (
+                _Command(self.tr("Find a panel to add"), "Ctrl+I", "layout"),
+                lambda: self._focus("catalogue"),
+            ),
+            "form": (
+                _Command(self.tr("Properties of the selected panel"), "Ctrl+E", "layout"),
+                lambda: self._focus("form"),
+            ),
+            "keys": (_Command(self.tr("Keys")), self.showKeys),
+            "hints": (_Command(self.tr("Tour of the cockpit")), lambda: report(self, hints=True)),
             "help": (_Command(self.tr("Help")), lambda: self.help("")),
         }
 
@@ -1095,23 +1116,66 @@ class CockpitProgram(QtCore.QObject):
         file = _help_folder() / name
         try:
             report(self, helpText=_readable(file.read_text(encoding="utf-8")))
+            self._page = name
         except OSError as error:
             self.say(f"{file}: {error.strerror or error}")
 
     @Slot(str)
     def follow(self, link: str) -> None:
         """Open the page that a link of the help leads to."""
-        name = link.partition("#")[0].rpartition("/")[2]
-        if not name.endswith(".md"):
-            self.say(link)
+        address = link.partition("#")[0]
+        name = posixpath.normpath(posixpath.join(posixpath.dirname(self._page), address))
+        if not (address.endswith(".md") and (_help_folder() / name).is_file()):
+            self.say(
+                self.tr("this is not among the pages that come with the cockpit: {}").format(link)
+            )
             return
-        folder = "" if (_help_folder() / name).is_file() else "controls/"
-        self.help(f"{folder}{name.removesuffix('.md')}.html")
+        self.help(f"{name.removesuffix('.md')}.html")
 
     @Slot()
     def closeHelp(self) -> None:
         """Close the page of help."""
         report(self, helpText="")
+
+    @Slot()
+    def showKeys(self) -> None:
+        """Show the keys of the editor, of the layout, and of edit mode."""
+        editor = [(_shown_keys(one.keys), one.text) for one, _ in self._commands().values()]
+        groups = {self.tr("Keys"): [row for row in editor if row[0]]}
+        if self._live is not None and is_alive(self._live.root):
+            for name, title in (
+                ("keyMap", self.tr("In a layout")),
+                ("editKeyMap", self.tr("In edit mode")),
+            ):
+                groups[title] = _plain(self._live.root.property(name))
+        text = "\n".join(
+            f"# {title}\n\n" + "\n".join(f"- **{keys}**: {said}" for keys, said in rows) + "\n"
+            for title, rows in groups.items()
+        )
+        report(self, helpText=text)
+
+    @Slot(str, result=str)
+    def keysOf(self, name: str) -> str:
+        """Return the keys of a command, as they are written on the user's keyboard."""
+        return _shown_keys(self._commands()[name][0].keys)
+
+    def _focus(self, place: str) -> None:
+        """Give the keyboard to the catalogue or the form, in edit mode."""
+        if place == "form" and self._selection is None:
+            self.say(self.tr("select a panel first"))
+            return
+        self._edit_mode(True)
+        self.focusWanted.emit(place)
+
+    @Slot()
+    def endHints(self) -> None:
+        """Remember that the tour was shown."""
+        report(self, hints=False)
+        try:
+            self._state.mkdir(parents=True, exist_ok=True)
+            (self._state / _HINTS_SEEN).touch()
+        except OSError as error:
+            _log.warning("%s: the tour will be shown again: %s", self._state, error)
 
     def _on_problem(self) -> None:
         if self._live is None:
@@ -1203,6 +1267,12 @@ def _translated(text: str) -> str:
     return str(QtCore.QCoreApplication.translate("Catalogue", text))
 
 
+def _plain(value: Any) -> list[tuple[str, str]]:
+    """Return a list of keys and texts of QML."""
+    rows = value.toVariant() if hasattr(value, "toVariant") else value
+    return [(str(keys), str(text)) for keys, text in rows or ()]
+
+
 def _shown_keys(keys: str) -> str:
     """Return keys as they are written on the user's keyboard, such as ``Strg+P``."""
     return QtGui.QKeySequence(keys).toString(QtGui.QKeySequence.SequenceFormat.NativeText)
@@ -1233,5 +1303,7 @@ def _readable(text: str) -> str:
     """Return a page without what only the web pages have: images and included files."""
     lines = text.splitlines()
     return "\n".join(
-        line for line in lines if not line.startswith(("![", "--8<--")) and line.strip() != "```qml"
+        "```" if line.startswith("```") else line
+        for line in lines
+        if not line.startswith(("![", "--8<--"))
     )

@@ -606,7 +606,7 @@
     </message>
     <message>
         <source>Robot tiles</source>
-        <translation type="unfinished"></translation>
+        <translation>Roboterkacheln</translation>
     </message>
     <message>
         <source>Steers a robot by keys that are held down, wherever the focus in the window is, except in a text field.</source>
@@ -746,7 +746,7 @@
     </message>
     <message>
         <source>All robots at a glance: a tile for each, with camera, battery, mode, alarms and age.</source>
-        <translation type="unfinished"></translation>
+        <translation>Alle Roboter auf einen Blick: je eine Kachel mit Kamera, Batterie, Modus, Alarmen und Alter.</translation>
     </message>
 </context>
 <context>
@@ -826,6 +826,46 @@
         <source>help on the panel</source>
         <translation>Hilfe zum Panel</translation>
     </message>
+    <message>
+        <source>Ctrl+Shift+arrow keys</source>
+        <translation>Strg+Umschalt+Pfeiltasten</translation>
+    </message>
+    <message>
+        <source>move the panel past its neighbour, or to the edge of the page; move the page</source>
+        <translation>Panel am Nachbarn vorbei oder an den Seitenrand verschieben; Seite verschieben</translation>
+    </message>
+    <message>
+        <source>F8, arrow keys, Enter</source>
+        <translation>F8, Pfeiltasten, Enter</translation>
+    </message>
+    <message>
+        <source>change the size of the panel; with Shift, finely</source>
+        <translation>Größe des Panels ändern; mit Umschalt fein</translation>
+    </message>
+    <message>
+        <source>F2</source>
+        <translation>F2</translation>
+    </message>
+    <message>
+        <source>rename the panel or page</source>
+        <translation>Panel oder Seite umbenennen</translation>
+    </message>
+    <message>
+        <source>Del</source>
+        <translation>Entf</translation>
+    </message>
+    <message>
+        <source>remove the panel or page</source>
+        <translation>Panel oder Seite entfernen</translation>
+    </message>
+    <message>
+        <source>Esc</source>
+        <translation>Esc</translation>
+    </message>
+    <message>
+        <source>cancel dragging</source>
+        <translation>Ziehen abbrechen</translation>
+    </message>
 </context>
 <context>
     <name>CockpitProgram</name>
@@ -836,6 +876,34 @@
     <message>
         <source>{} nodes, {} topics</source>
         <translation>{} Knoten, {} Topics</translation>
+    </message>
+    <message>
+        <source>reading {} …</source>
+        <translation>liest {} …</translation>
+    </message>
+    <message>
+        <source>Close</source>
+        <translation>Schließen</translation>
+    </message>
+    <message>
+        <source>{} is open</source>
+        <translation>{} ist offen</translation>
+    </message>
+    <message>
+        <source>Recording</source>
+        <translation>Aufnahme</translation>
+    </message>
+    <message>
+        <source>no recording is open</source>
+        <translation>keine Aufnahme offen</translation>
+    </message>
+    <message>
+        <source>this is a recording; connect to a robot to record it</source>
+        <translation>dies ist eine Aufnahme; zum Aufnehmen mit einem Roboter verbinden</translation>
+    </message>
+    <message>
+        <source>connect to a robot first</source>
+        <translation>zuerst mit einem Roboter verbinden</translation>
     </message>
     <message>
         <source>a simulated robot is being started</source>
@@ -910,6 +978,18 @@
         <translation>Verwerfen</translation>
     </message>
     <message>
+        <source>and {} more, which are logged</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>This layout of {} was read, except for:</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>this layout of {} was read</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Add {}</source>
         <translation>{} hinzufügen</translation>
     </message>
@@ -982,6 +1062,34 @@
         <translation>Aufnahme öffnen</translation>
     </message>
     <message>
+        <source>Close the recording</source>
+        <translation>Aufnahme schließen</translation>
+    </message>
+    <message>
+        <source>Record, or stop recording</source>
+        <translation>Aufnehmen oder beenden</translation>
+    </message>
+    <message>
+        <source>Mark this moment in the recording</source>
+        <translation>Diesen Moment in der Aufnahme markieren</translation>
+    </message>
+    <message>
+        <source>Find a panel to add</source>
+        <translation>Panel zum Hinzufügen suchen</translation>
+    </message>
+    <message>
+        <source>Properties of the selected panel</source>
+        <translation>Eigenschaften des gewählten Panels</translation>
+    </message>
+    <message>
+        <source>Keys</source>
+        <translation>Tasten</translation>
+    </message>
+    <message>
+        <source>Tour of the cockpit</source>
+        <translation>Rundgang durchs Cockpit</translation>
+    </message>
+    <message>
         <source>Help</source>
         <translation>Hilfe</translation>
     </message>
@@ -1052,6 +1160,18 @@
     <message>
         <source>Go on</source>
         <translation>Zurück</translation>
+    </message>
+    <message>
+        <source>this is not among the pages that come with the cockpit: {}</source>
+        <translation>diese Seite gehört nicht zur Hilfe des Cockpits: {}</translation>
+    </message>
+    <message>
+        <source>In a layout</source>
+        <translation>Im Layout</translation>
+    </message>
+    <message>
+        <source>In edit mode</source>
+        <translation>Beim Bearbeiten</translation>
     </message>
     <message>
         <source>connected</source>
@@ -1314,6 +1434,22 @@
         <translation>Cockpit</translation>
     </message>
     <message>
+        <source>Choose the robot here. Without one, try everything on a simulated robot.</source>
+        <translation>Hier den Roboter wählen. Ohne Roboter lässt sich alles an einem simulierten testen.</translation>
+    </message>
+    <message>
+        <source>Add panels: show all that suits the robot, or start with an empty layout and choose from the list on the left.</source>
+        <translation>Panels hinzufügen: alle zeigen, die zum Roboter passen, oder leer beginnen und aus der Liste links wählen.</translation>
+    </message>
+    <message>
+        <source>F4 changes between editing and using a layout. While it is used, nothing moves under your hand.</source>
+        <translation>F4 wechselt zwischen Bearbeiten und Benutzen. Beim Benutzen verrutscht nichts unter der Hand.</translation>
+    </message>
+    <message>
+        <source>%1 finds every command by a part of its name, the list of keys and this tour included. F1 explains the current panel.</source>
+        <translation>%1 findet jeden Befehl nach einem Teil seines Namens, auch die Tastenliste und diesen Rundgang. F1 erklärt das aktuelle Panel.</translation>
+    </message>
+    <message>
         <source>%1 has changes that are not saved.</source>
         <translation>%1 hat ungespeicherte Änderungen.</translation>
     </message>
@@ -1369,6 +1505,14 @@
         <translation>Wiederholen</translation>
     </message>
     <message>
+        <source>Record</source>
+        <translation>Aufnehmen</translation>
+    </message>
+    <message>
+        <source>● Stop recording, %1 s</source>
+        <translation>● Aufnahme beenden, %1 s</translation>
+    </message>
+    <message>
         <source>Commands …</source>
         <translation>Befehle …</translation>
     </message>
@@ -1379,6 +1523,10 @@
     <message>
         <source>Find robot</source>
         <translation>Roboter suchen</translation>
+    </message>
+    <message>
+        <source>Close recording</source>
+        <translation>Aufnahme schließen</translation>
     </message>
 </context>
 <context>
@@ -1499,8 +1647,8 @@
         <translation>Layouts (*.qml)</translation>
     </message>
     <message>
-        <source>Layouts (*.qml *.json)</source>
-        <translation>Layouts (*.qml *.json)</translation>
+        <source>Layouts (*.qml *.json *.rqml)</source>
+        <translation type="unfinished"></translation>
     </message>
 </context>
 <context>
@@ -2404,6 +2552,14 @@
         <translation>Strg+%1</translation>
     </message>
     <message>
+        <source>Window</source>
+        <translation>Fenster</translation>
+    </message>
+    <message>
+        <source>Show the window %1 again</source>
+        <translation>Fenster %1 wieder zeigen</translation>
+    </message>
+    <message>
         <source>Add a page</source>
         <translation>Seite hinzufügen</translation>
     </message>
@@ -2484,6 +2640,14 @@
         <translation>Nach rechts</translation>
     </message>
     <message>
+        <source>Ctrl+Shift+←</source>
+        <translation>Strg+Umschalt+←</translation>
+    </message>
+    <message>
+        <source>Ctrl+Shift+→</source>
+        <translation>Strg+Umschalt+→</translation>
+    </message>
+    <message>
         <source>Move up</source>
         <translation>Nach oben</translation>
     </message>
@@ -2492,12 +2656,24 @@
         <translation>Nach unten</translation>
     </message>
     <message>
+        <source>Ctrl+Shift+↑</source>
+        <translation>Strg+Umschalt+↑</translation>
+    </message>
+    <message>
+        <source>Ctrl+Shift+↓</source>
+        <translation>Strg+Umschalt+↓</translation>
+    </message>
+    <message>
         <source>Move to %1</source>
         <translation>Nach %1</translation>
     </message>
     <message>
         <source>Remove</source>
         <translation>Entfernen</translation>
+    </message>
+    <message>
+        <source>Del</source>
+        <translation>Entf</translation>
     </message>
     <message>
         <source>Help</source>
@@ -2732,6 +2908,10 @@
 </context>
 <context>
     <name>PropertyBox</name>
+    <message>
+        <source>The selected panel</source>
+        <translation>Das gewählte Panel</translation>
+    </message>
     <message>
         <source>Title of the panel</source>
         <translation>Titel des Panels</translation>
@@ -2975,6 +3155,65 @@
     </message>
 </context>
 <context>
+    <name>RecordingStrip</name>
+    <message>
+        <source>nothing is being recorded</source>
+        <translation>es wird nichts aufgenommen</translation>
+    </message>
+    <message>
+        <source>Mark</source>
+        <translation>Marke</translation>
+    </message>
+    <message>
+        <source>mark %1 written</source>
+        <translation>Marke %1 gesetzt</translation>
+    </message>
+    <message>
+        <source>Recording</source>
+        <translation>Aufnahme</translation>
+    </message>
+    <message>
+        <source>Recorder</source>
+        <translation>Aufnahme</translation>
+    </message>
+    <message>
+        <source>recorded to %1 (%2)</source>
+        <translation>aufgenommen in %1 (%2)</translation>
+    </message>
+    <message>
+        <source>ends at</source>
+        <translation>endet bei</translation>
+    </message>
+    <message>
+        <source>Size at which the recording ends</source>
+        <translation>Größe, bei der die Aufnahme endet</translation>
+    </message>
+    <message>
+        <source>1 GB</source>
+        <translation>1 GB</translation>
+    </message>
+    <message>
+        <source>4 GB</source>
+        <translation>4 GB</translation>
+    </message>
+    <message>
+        <source>16 GB</source>
+        <translation>16 GB</translation>
+    </message>
+    <message>
+        <source>64 GB</source>
+        <translation>64 GB</translation>
+    </message>
+    <message>
+        <source>no limit</source>
+        <translation>ohne Grenze</translation>
+    </message>
+    <message>
+        <source>Close</source>
+        <translation>Schließen</translation>
+    </message>
+</context>
+<context>
     <name>RefreshButton</name>
     <message>
         <source>Refresh</source>
@@ -3024,11 +3263,11 @@
     </message>
     <message>
         <source>no robot: no namespace has %1</source>
-        <translation type="unfinished"></translation>
+        <translation>kein Roboter: kein Namespace hat %1</translation>
     </message>
     <message>
         <source>1 robot</source>
-        <translation type="unfinished"></translation>
+        <translation>1 Roboter</translation>
     </message>
     <message>
         <source>%1 robots</source>
@@ -3036,15 +3275,15 @@
     </message>
     <message>
         <source>%1 in trouble</source>
-        <translation type="unfinished"></translation>
+        <translation>%1 gestört</translation>
     </message>
     <message>
         <source>%1 not shown</source>
-        <translation type="unfinished"></translation>
+        <translation>%1 nicht gezeigt</translation>
     </message>
     <message>
         <source>no battery</source>
-        <translation type="unfinished"></translation>
+        <translation>keine Batterie</translation>
     </message>
     <message>
         <source>? %</source>
@@ -3052,7 +3291,7 @@
     </message>
     <message>
         <source>%1 %, OLD</source>
-        <translation type="unfinished"></translation>
+        <translation>%1 %, ALT</translation>
     </message>
     <message>
         <source>%1 %</source>
@@ -3060,15 +3299,15 @@
     </message>
     <message>
         <source>no diagnostics</source>
-        <translation type="unfinished"></translation>
+        <translation>keine Diagnose</translation>
     </message>
     <message>
         <source>diagnostics: none yet</source>
-        <translation type="unfinished"></translation>
+        <translation>Diagnose: noch keine</translation>
     </message>
     <message>
         <source>diagnostics silent</source>
-        <translation type="unfinished"></translation>
+        <translation>Diagnose stumm</translation>
     </message>
     <message>
         <source>1 error</source>
@@ -3092,23 +3331,23 @@
     </message>
     <message>
         <source>no alarm</source>
-        <translation type="unfinished"></translation>
+        <translation>kein Alarm</translation>
     </message>
     <message>
         <source>selected</source>
-        <translation type="unfinished"></translation>
+        <translation>gewählt</translation>
     </message>
     <message>
         <source>TWO OF THIS NAME</source>
-        <translation type="unfinished"></translation>
+        <translation>NAME DOPPELT</translation>
     </message>
     <message>
         <source>GONE</source>
-        <translation type="unfinished"></translation>
+        <translation>WEG</translation>
     </message>
     <message>
         <source>nothing to show</source>
-        <translation type="unfinished"></translation>
+        <translation>nichts zu zeigen</translation>
     </message>
     <message>
         <source>%1 s</source>
@@ -3116,7 +3355,7 @@
     </message>
     <message>
         <source>no camera</source>
-        <translation type="unfinished"></translation>
+        <translation>keine Kamera</translation>
     </message>
 </context>
 <context>
@@ -3313,12 +3552,20 @@
         <translation>Neu suchen</translation>
     </message>
     <message>
+        <source>Open a recording …</source>
+        <translation>Aufnahme öffnen …</translation>
+    </message>
+    <message>
         <source>Try it on a simulated robot</source>
         <translation>An simuliertem Roboter testen</translation>
     </message>
     <message>
         <source>This robot offers data for %1 panels</source>
         <translation>Dieser Roboter bietet Daten für %1 Panels</translation>
+    </message>
+    <message>
+        <source>This recording has data for %1 panels</source>
+        <translation>Diese Aufnahme hat Daten für %1 Panels</translation>
     </message>
     <message>
         <source>Show all</source>
@@ -3456,8 +3703,24 @@
         <translation>%1 von %2</translation>
     </message>
     <message>
+        <source>Topics of the recording</source>
+        <translation>Topics der Aufnahme</translation>
+    </message>
+    <message>
+        <source>%1: %2 messages</source>
+        <translation>%1: %2 Nachrichten</translation>
+    </message>
+    <message>
+        <source>%1 · %2</source>
+        <translation>%1 · %2</translation>
+    </message>
+    <message>
         <source>Time of the recording</source>
         <translation>Zeit der Aufnahme</translation>
+    </message>
+    <message>
+        <source>from %1 to %2</source>
+        <translation>von %1 bis %2</translation>
     </message>
     <message>
         <source>%1: %2</source>
@@ -3470,6 +3733,14 @@
     <message>
         <source>Play</source>
         <translation>Abspielen</translation>
+    </message>
+    <message>
+        <source>Step</source>
+        <translation>Schritt</translation>
+    </message>
+    <message>
+        <source>Play the next message</source>
+        <translation>Nächste Nachricht abspielen</translation>
     </message>
     <message>
         <source>Previous mark</source>
@@ -3490,6 +3761,30 @@
     <message>
         <source>Loop</source>
         <translation>Schleife</translation>
+    </message>
+    <message>
+        <source>From here</source>
+        <translation>Ab hier</translation>
+    </message>
+    <message>
+        <source>Play from here on</source>
+        <translation>Ab hier abspielen</translation>
+    </message>
+    <message>
+        <source>Until here</source>
+        <translation>Bis hier</translation>
+    </message>
+    <message>
+        <source>Play until here</source>
+        <translation>Bis hier abspielen</translation>
+    </message>
+    <message>
+        <source>Whole</source>
+        <translation>Ganz</translation>
+    </message>
+    <message>
+        <source>Play the whole recording</source>
+        <translation>Ganze Aufnahme abspielen</translation>
     </message>
     <message>
         <source>%1 / %2</source>
@@ -3564,6 +3859,33 @@
     <message>
         <source>nothing received in the last seconds</source>
         <translation>in den letzten Sekunden nichts empfangen</translation>
+    </message>
+</context>
+<context>
+    <name>TourBox</name>
+    <message>
+        <source>Tour</source>
+        <translation>Rundgang</translation>
+    </message>
+    <message>
+        <source>%1 of %2</source>
+        <translation>%1 von %2</translation>
+    </message>
+    <message>
+        <source>Skip</source>
+        <translation>Überspringen</translation>
+    </message>
+    <message>
+        <source>Skip the tour</source>
+        <translation>Rundgang überspringen</translation>
+    </message>
+    <message>
+        <source>Next</source>
+        <translation>Weiter</translation>
+    </message>
+    <message>
+        <source>Done</source>
+        <translation>Fertig</translation>
     </message>
 </context>
 <context>

@@ -217,3 +217,13 @@ def edit(
     for one in made:
         one.program.close()
     send_deferred_deletes()
+
+
+@pytest.fixture(autouse=True)
+def toured(request: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A state folder of the test's own, in which the cockpit's tour has been seen."""
+    state = tmp_path / "state" / "rosglass" / "cockpit"
+    state.mkdir(parents=True, exist_ok=True)
+    if request.node.get_closest_marker("first_start") is None:
+        (state / "tour_seen").touch()
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))

@@ -6,6 +6,9 @@ import RosControls 1.0
 FocusScope {
     id: box
 
+    // Gives the keyboard to the search.
+    function find() { field.forceActiveFocus(Qt.TabFocusReason) }
+
     Accessible.role: Accessible.Pane
     Accessible.name: qsTr("Panels to add")
 

@@ -23,7 +23,16 @@ Window {
         close.accepted = false
         closing.open()
     }
-    Component.onCompleted: program.begin(window, stage_)
+    Component.onCompleted: {
+        program.begin(window, stage_)
+        hint_()
+    }
+
+    function hint_() {
+        // Questions come first.
+        if (program.hints && !program.kiosk && program.question === "" && !tour.running)
+            tour.start()
+    }
 
     EditorBar {
         id: bar
@@ -42,13 +51,6 @@ Window {
         width: visible ? Math.min(280 * Theme.size, window.width * 0.3) : 0
         visible: window.editing
     }
-    PropertyBox {
-        id: properties
-        objectName: "properties"
-        anchors { right: parent.right; top: bar.bottom; bottom: strip.top }
-        width: visible ? Math.min(320 * Theme.size, window.width * 0.3) : 0
-        visible: window.editing && program.selected
-    }
     Item {
         id: stage_
         objectName: "stage"
@@ -58,10 +60,19 @@ Window {
         visible: program.opened
     }
     StartPage {
+        id: startPage
         objectName: "startPage"
         anchors.fill: stage_
         visible: !program.opened
         onFileWanted: function(purpose) { files.ask(purpose) }
+    }
+    // Behind the layout in the order of Tab, as on the screen.
+    PropertyBox {
+        id: properties
+        objectName: "properties"
+        anchors { right: parent.right; top: bar.bottom; bottom: strip.top }
+        width: visible ? Math.min(320 * Theme.size, window.width * 0.3) : 0
+        visible: window.editing && program.selected
     }
     ErrorBox {
         anchors { fill: stage_; margins: Theme.gap }
@@ -98,6 +109,25 @@ Window {
         }
     }
 
+    TourBox {
+        id: tour
+        objectName: "tour"
+        anchors.fill: parent
+        z: 1
+        steps: [
+            { item: bar.robotButton.visible ? bar.robotButton : startPage.robotTools, text: qsTr("Choose the robot here. Without one, try everything on a simulated robot.") },
+            { item: program.opened ? (catalogue.visible ? catalogue : bar.editButton) : startPage.layoutTools, text: qsTr("Add panels: show all that suits the robot, or start with an empty layout and choose from the list on the left.") },
+            { item: bar.editButton.visible ? bar.editButton : bar.commandsButton, text: qsTr("F4 changes between editing and using a layout. While it is used, nothing moves under your hand.") },
+            { item: bar.commandsButton, text: qsTr("%1 finds every command by a part of its name, the list of keys and this tour included. F1 explains the current panel.").arg(program.keysOf("palette")) }
+        ]
+        onEnded: program.endHints()
+
+        Shortcut {
+            sequence: "Escape"
+            enabled: tour.running && !palette.visible && !helpBox.visible && !question.visible && !closing.visible
+            onActivated: tour.end()
+        }
+    }
     CommandPalette { id: palette; objectName: "palette" }
     FileBox { id: files }
     HelpBox {
@@ -131,6 +161,24 @@ Window {
         }
     }
 
+    Connections {
+        target: program
+        function onHintsChanged() { window.hint_() }
+        function onQuestionChanged() { Qt.callLater(window.hint_) }
+        function onFocusWanted(place) {
+            if (place === "form")
+                properties.find()
+            else
+                catalogue.find()
+        }
+    }
+    // Without a panel; with one, F1 is its own.
+    Shortcut {
+        sequence: "F1"
+        enabled: !program.opened || !program.selected
+        onActivated: program.run("keys")
+        onActivatedAmbiguously: program.run("keys")
+    }
     Repeater {
         model: program.commands("")
         Item {

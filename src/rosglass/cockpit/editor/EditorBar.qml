@@ -7,6 +7,10 @@ Rectangle {
 
     // Seconds that have been recorded; negative while nothing is.
     property real recordedSeconds: -1
+    // For the tour.
+    readonly property Item robotButton: robot
+    readonly property Item editButton: edit
+    readonly property Item commandsButton: commands
 
     signal paletteWanted()
     signal fileWanted(string purpose)
@@ -32,6 +36,7 @@ Rectangle {
             onClicked: program.path ? program.save("") : bar.fileWanted("save as")
         }
         ThemeButton {
+            id: edit
             objectName: "edit"
             text: program.editing ? qsTr("Done") : qsTr("Edit")
             visible: program.opened
@@ -62,7 +67,7 @@ Rectangle {
             tint: Theme.bad
             onClicked: program.run("record")
         }
-        ThemeButton { text: qsTr("Commands …"); objectName: "commands"; onClicked: bar.paletteWanted() }
+        ThemeButton { id: commands; text: qsTr("Commands …"); objectName: "commands"; onClicked: bar.paletteWanted() }
     }
     ThemeText {
         anchors { left: tools.right; right: robot.left; margins: Theme.gap; verticalCenter: parent.verticalCenter }

@@ -6,6 +6,12 @@ import ".."
 FocusScope {
     id: box
 
+    // Gives the keyboard to the title.
+    function find() { title.forceActiveFocus(Qt.TabFocusReason) }
+
+    Accessible.role: Accessible.Pane
+    Accessible.name: qsTr("The selected panel")
+
     Rectangle {
         anchors.fill: parent
         color: Theme.panel

@@ -10,6 +10,11 @@ T.Popup {
     property var answers: []
     signal answered(int index)
 
+    function first_() {
+        if (choices.count)
+            choices.itemAt(0).forceActiveFocus(Qt.TabFocusReason)
+    }
+
     function choose(index) {
         close()
         answered(index)
@@ -22,6 +27,9 @@ T.Popup {
     modal: true
     focus: true
     padding: 2 * Theme.gap
+    // Return answers once it is seen: not before the window is shown.
+    onOpened: first_()
+    onAnswersChanged: if (opened) Qt.callLater(first_)
     closePolicy: T.Popup.NoAutoClose
 
     T.Overlay.modal: Rectangle { color: Theme.shade; opacity: 0.7 }
@@ -39,13 +47,13 @@ T.Popup {
             Accessible.role: Accessible.AlertMessage
             Accessible.name: text
         }
-        Row {
-            anchors.right: parent.right
+        Flow {
+            width: parent.width
             spacing: Theme.gap
             Repeater {
+                id: choices
                 model: box.answers
                 delegate: ThemeButton {
-                    focus: index === 0
                     text: modelData
                     objectName: "answer" + index
                     onClicked: box.choose(index)

@@ -5,6 +5,10 @@ import RosControls 1.0
 Rectangle {
     id: page
 
+    // For the tour.
+    readonly property Item robotTools: robotTools_
+    readonly property Item layoutTools: proposals.visible ? proposals : layoutTools_
+
     signal fileWanted(string purpose)
 
     color: Theme.background
@@ -67,6 +71,7 @@ Rectangle {
                 }
             }
             Row {
+                id: robotTools_
                 spacing: Theme.gap
                 ThemeField {
                     id: address
@@ -86,6 +91,7 @@ Rectangle {
                 spacing: Theme.gap
                 visible: program.proposals.length > 0
                 Row {
+                    id: proposals
                     spacing: Theme.gap
                     ThemeText {
                         anchors.verticalCenter: parent.verticalCenter
@@ -120,6 +126,7 @@ Rectangle {
                 spacing: Theme.gap
                 ThemeText { text: qsTr("Layouts"); font { pixelSize: Theme.large; weight: Font.DemiBold } }
                 Row {
+                    id: layoutTools_
                     spacing: Theme.gap
                     ThemeButton { objectName: "new"; text: qsTr("New, empty"); onClicked: program.run("new") }
                     ThemeButton { text: qsTr("Open …"); onClicked: page.fileWanted("open") }

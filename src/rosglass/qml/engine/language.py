@@ -53,13 +53,13 @@ def translate_texts() -> None:
 
 
 def translate_qt() -> None:
-    """Translate Qt's own texts, such as those of file dialogs; for programs of rosglass alone."""
+    """Translate Qt's own texts, such as names of keys; for programs of rosglass alone."""
     app = QtCore.QCoreApplication.instance()
     info: Any = QtCore.QLibraryInfo
     where = getattr(info, "path", None) or info.location
     folder = Path(where(info.TranslationsPath))
-    for name in ("qtbase", "qtdeclarative"):
-        _install(app, name, folder / f"{name}_{chosen_language()}.qm")
+    # Not those of QML, whose errors are read: "did you mean" depends on the English words.
+    _install(app, "qtbase", folder / f"qtbase_{chosen_language()}.qm")
 
 
 def _install(app: Any, name: str, file: Path) -> None:

@@ -39,6 +39,14 @@ Item {
         [qsTr("Shift+F10"), qsTr("menu of the panel")],
         [qsTr("F1"), qsTr("help on the panel")]
     ]
+    // Keys of edit mode: of the panel whose title has the keyboard (F6), and of a page's button.
+    readonly property var editKeyMap: [
+        [qsTr("Ctrl+Shift+arrow keys"), qsTr("move the panel past its neighbour, or to the edge of the page; move the page")],
+        [qsTr("F8, arrow keys, Enter"), qsTr("change the size of the panel; with Shift, finely")],
+        [qsTr("F2"), qsTr("rename the panel or page")],
+        [qsTr("Del"), qsTr("remove the panel or page")],
+        [qsTr("Esc"), qsTr("cancel dragging")]
+    ]
 
     default property alias content: area.data
     readonly property Item holder_: stage

@@ -19,8 +19,8 @@ T.Popup {
         all.push(["detach", panel.detached ? qsTr("Put back") : qsTr("Own window"), ""])
         if (editing_)
             all.push(["rename", qsTr("Rename"), "F2"], ["resize", qsTr("Resize by keys"), "F8"],
-                ["left", qsTr("Move left"), "Ctrl+Shift+←"], ["right", qsTr("Move right"), "Ctrl+Shift+→"],
-                ["top", qsTr("Move up"), "Ctrl+Shift+↑"], ["bottom", qsTr("Move down"), "Ctrl+Shift+↓"])
+                ["left", qsTr("Move left"), qsTr("Ctrl+Shift+←")], ["right", qsTr("Move right"), qsTr("Ctrl+Shift+→")],
+                ["top", qsTr("Move up"), qsTr("Ctrl+Shift+↑")], ["bottom", qsTr("Move down"), qsTr("Ctrl+Shift+↓")])
         if (editing_ && cockpit_.pages.length > 1)
             for (const page of cockpit_.pages)
                 if (page !== cockpit_.page)
@@ -29,7 +29,7 @@ T.Popup {
             for (const one of cockpit_.panelActions)
                 all.push([one.name, one.text, one.keys || ""])
         if (editing_)
-            all.push(["remove", qsTr("Remove"), "Del"])
+            all.push(["remove", qsTr("Remove"), qsTr("Del")])
         all.push(["help", qsTr("Help"), "F1"])
         return all
     }
