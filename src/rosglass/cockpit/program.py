@@ -27,10 +27,12 @@ from rosglass.cockpit.panels import Panel, Proposal, controls, find, folder_pane
 from rosglass.cockpit.property_form import PropertyModel
 from rosglass.cockpit.qml_document import Code, Document, to_qml
 from rosglass.cockpit.recordings import SCHEME, Examined, examine, is_recording, path_of
+from rosglass.cockpit.robot_pages import pages_for_robots
 from rosglass.cockpit.robots import FoundRobot, RobotSearch, addresses
 from rosglass.cockpit.rqml import RqmlPlugin, find_plugins
 from rosglass.cockpit.rqml_api import RqmlApi
 from rosglass.cockpit.trust import TrustedLayouts, senders
+from rosglass.controls.topics.graph_watch import GraphWatch
 from rosglass.errors import Error
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qml.engine.runtime import runtime_of
@@ -60,6 +62,8 @@ _UNSAVED = "unsaved.qml"
 _MAX_RECENT = 8
 #: Senders that a question lists.
 _MAX_SENDERS = 8
+#: The topic in whose namespaces robots are, as for RobotSwitch.
+_ROBOT_TOPIC = "cmd_vel"
 #: Lines of a list of what was not imported that are shown.
 _MAX_LEFT_OUT = 12
 #: File of the state folder that says that the tour was shown.
@@ -198,6 +202,7 @@ class CockpitProgram(QtCore.QObject):
         self._tour: list[subprocess.Popen[bytes]] = []
         self._wanted = ""
         self._properties: PropertyModel | None = None
+        self._graph: GraphWatch | None = None
         self._state = state_folder()
         self._trusted = TrustedLayouts()
         self._found.connect(self._on_found)
@@ -897,6 +902,10 @@ class CockpitProgram(QtCore.QObject):
             "redo": (_Command(self.tr("Redo"), "Ctrl+Shift+Z", "edit"), self.redo),
             "remove": (_Command(self.tr("Remove the selected panel"), "", "edit"), self._remove),
             "add page": (_Command(self.tr("Add a page"), "", "edit"), self._add_page),
+            "robot pages": (
+                _Command(self.tr("Pages for all robots"), "", "edit"),
+                self._add_robot_pages,
+            ),
             "add all": (_Command(self.tr("New layout of what the robot offers")), self.addAll),
             "search": (_Command(self.tr("Search robots")), self.searchRobots),
             "tour": (_Command(self.tr("Try it on a simulated robot")), self.startTour),
@@ -1007,6 +1016,34 @@ class CockpitProgram(QtCore.QObject):
 
     def _add_page(self) -> None:
         self._edit(self.tr("Add page"), lambda edits: edits.add_page(self.tr("Page")))
+
+    def _add_robot_pages(self) -> None:
+        """Make a page for each robot from the first one."""
+        live = self._live
+        assert live is not None
+        if live.document is None:
+            return
+        if self._graph is None:
+            self._graph = GraphWatch(self, runtime_of(self._window))
+        robots = self._graph.namespaces(_ROBOT_TOPIC)
+        try:
+            pages = pages_for_robots(live.document, robots, self._has_ns)
+        except Error as error:
+            self.say(str(error))
+            return
+        if not pages.made:
+            self.say(self.tr("each of the {} robots has its page").format(len(robots)))
+            return
+        self._apply(self.tr("Pages for all robots"), pages.document)
+        if pages.same:
+            listed = ", ".join(pages.same[:_MAX_SENDERS])
+            self.say(self.tr("{} pages; the same on all: {}").format(len(pages.made), listed))
+        else:
+            self.say(self.tr("{} pages").format(len(pages.made)))
+
+    def _has_ns(self, kind: str) -> bool:
+        about = self._about(kind)
+        return about is not None and about.property("ns") is not None
 
     # -- files -----------------------------------------------------------------------------------
 

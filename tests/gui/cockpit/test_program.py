@@ -245,3 +245,31 @@ def test_broken_layout_of_foxglove_is_refused(edit: Callable[..., Any], file: Pa
         file.stem, "layout"
     )
     assert editor.text == LAYOUT
+
+
+def test_pages_for_all_robots_are_made_and_undone(edit: Callable[..., Any], file: Path) -> None:
+    editor = edit(file)
+    editor.wait(lambda: editor.program.opened)
+    editor.program.run("edit")
+    editor.program.run("robot pages")
+    assert "no robot is found" in editor.program.message
+    twist = "geometry_msgs/msg/Twist"
+    keep = [
+        editor.bench.robot.create_subscription(f"/{name}/cmd_vel", twist, lambda _: None)
+        for name in ("anna", "bert", "carl")
+    ]
+    graph = editor.program._graph
+    editor.wait(lambda: len(graph.namespaces("cmd_vel")) == 3)
+    editor.program.run("robot pages")
+    assert editor.text.count("Page {") == 3
+    pages = editor.root.property("pages").toVariant()
+    assert [one.property("ns") for one in pages] == ["/anna", "/bert", "/carl"]
+    assert [one.property("title") for one in pages] == ["One anna", "One bert", "One carl"]
+    assert editor.text.count('Battery { topic: "/battery"; ns: "/bert" } // of the arm') == 1
+    assert "/battery (line 15)" in editor.program.message
+    editor.program.run("robot pages")
+    assert editor.program.message == "each of the 3 robots has its page"
+    editor.program.undo()
+    assert editor.text == LAYOUT
+    for one in keep:
+        one.close()
