@@ -979,14 +979,18 @@
     </message>
     <message>
         <source>and {} more, which are logged</source>
-        <translation type="unfinished"></translation>
+        <translation>und {} weitere, die im Log stehen</translation>
     </message>
     <message>
         <source>This layout of {} was read, except for:</source>
-        <translation type="unfinished"></translation>
+        <translation>Dieses Layout von {} wurde gelesen, bis auf:</translation>
     </message>
     <message>
         <source>this layout of {} was read</source>
+        <translation>dieses Layout von {} wurde gelesen</translation>
+    </message>
+    <message>
+        <source>A plugin asks for {}: a kiosk&apos;s layout stays</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1044,6 +1048,10 @@
     <message>
         <source>Add a page</source>
         <translation>Seite hinzufügen</translation>
+    </message>
+    <message>
+        <source>Pages for all robots</source>
+        <translation>Seiten für alle Roboter</translation>
     </message>
     <message>
         <source>New layout of what the robot offers</source>
@@ -1128,6 +1136,18 @@
     <message>
         <source>Page</source>
         <translation>Seite</translation>
+    </message>
+    <message>
+        <source>each of the {} robots has its page</source>
+        <translation>jeder der {} Roboter hat seine Seite</translation>
+    </message>
+    <message>
+        <source>{} pages; the same on all: {}</source>
+        <translation>{} Seiten; auf allen gleich: {}</translation>
+    </message>
+    <message>
+        <source>{} pages</source>
+        <translation>{} Seiten</translation>
     </message>
     <message>
         <source>{} exists already.</source>
@@ -1648,7 +1668,7 @@
     </message>
     <message>
         <source>Layouts (*.qml *.json *.rqml)</source>
-        <translation type="unfinished"></translation>
+        <translation>Layouts (*.qml *.json *.rqml)</translation>
     </message>
 </context>
 <context>
