@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rosglass.cockpit.qml_document import Object
     from rosglass.qml.engine.session import Session
 
-__all__ = ["LiveLayout"]
+__all__ = ["LiveLayout", "content_items", "qml_type"]
 
 _log = logging.getLogger("rosglass.cockpit")
 #: ``element_`` of the QML files -> type.
@@ -320,7 +320,7 @@ class LiveLayout(QtCore.QObject):
             wanted = children[number]
             name = wanted.type.rpartition(".")[2]
             alike = [one for one in children if one.type == wanted.type]
-            candidates = [one for one in _content_of(living) if _class_of(one) == name]
+            candidates = [one for one in content_items(living) if qml_type(one) == name]
             if len(alike) != len(candidates):
                 raise _NotFollowedError
             living, found = candidates[alike.index(wanted)], wanted
@@ -572,7 +572,7 @@ def _elements_on_screen(item: Any) -> dict[str, list[Any]]:
     return {"windows": windows, "others": others}
 
 
-def _content_of(item: Any) -> list[Any]:
+def content_items(item: Any) -> list[Any]:
     """Return the objects of the default property."""
     # Not by metaObject(), whose wrapper outlives the object: PySide takes the next one at its
     # address for it.
@@ -583,8 +583,8 @@ def _content_of(item: Any) -> list[Any]:
     return [found.at(number) for number in range(found.count())]
 
 
-def _class_of(item: Any) -> str:
-    """Return the type of an object; see :func:`_content_of`."""
+def qml_type(item: Any) -> str:
+    """Return the type of an object; see :func:`content_items`."""
     context = QtQml.QQmlEngine.contextForObject(item)
     if context is None:
         return ""

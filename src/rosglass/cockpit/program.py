@@ -12,7 +12,6 @@ import sys
 import threading
 import time
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,6 +22,7 @@ from rosglass.cockpit.layout_edits import LayoutEdits
 from rosglass.cockpit.layout_file import LayoutFile, Recovery, state_folder
 from rosglass.cockpit.layout_imports import import_layout, is_foreign
 from rosglass.cockpit.live_layout import LiveLayout
+from rosglass.cockpit.own_changes import OwnChanges, content_of
 from rosglass.cockpit.panels import Panel, Proposal, controls, find, folder_panels, propose, search
 from rosglass.cockpit.property_form import PropertyModel
 from rosglass.cockpit.qml_document import Code, Document, to_qml
@@ -54,8 +54,6 @@ _log = logging.getLogger("rosglass.cockpit")
 WINDOW = Path(__file__).with_name("editor") / "Editor.qml"
 #: Seconds for which a message stays, and between two looks at the file.
 _MESSAGE_S, _LOOK_S = 10.0, 1.0
-#: Dynamic property of plugins whose context is kept.
-_FOLLOWED = "rosglass_followed"
 #: Name under which a layout that has no file yet is kept for a recovery.
 _UNSAVED = "unsaved.qml"
 #: Files opened lately that are remembered.
@@ -196,6 +194,7 @@ class CockpitProgram(QtCore.QObject):
         self._file: LayoutFile | None = None
         self._history = History("")
         self._live: LiveLayout | None = None
+        self._own_changes: OwnChanges | None = None
         self._at_home = True
         self._said_at = 0.0
         self._reply: Callable[[int], object] | None = None
@@ -652,6 +651,9 @@ class CockpitProgram(QtCore.QObject):
         live.refused.connect(self.say)
         live.problem_changed.connect(self._on_problem)
         live.loaded.connect(self._on_loaded)
+        self._own_changes = OwnChanges(live)
+        self._own_changes.edited.connect(self._on_own_change)
+        self._own_changes.refused.connect(self.say)
         before, self._live = self._live, live
         self._history, self._at_home = History(document.text), False
         report(
@@ -688,7 +690,7 @@ class CockpitProgram(QtCore.QObject):
 
     def _on_help_requested(self, item: Any) -> None:
         live = self._live
-        shown = _content_of(live.object_of(item)) if live is not None else None
+        shown = content_of(live.object_of(item)) if live is not None else None
         about = self._about(shown.type) if shown is not None else None
         self.help(about.page if about is not None else "")
 
@@ -702,43 +704,17 @@ class CockpitProgram(QtCore.QObject):
 
     def _show(self, document: Document) -> None:
         assert self._live is not None
-        self._live.show(document)
-        self._follow_plugins()
-        self._refresh()
-
-    def _follow_plugins(self) -> None:
-        """Keep what plugins of RQml change in their contexts, in the text."""
-        live = self._live
-        assert live is not None
-        assert live.document is not None
-        for found in live.document.objects():
-            panel = live.item_of(found.parent) if found.parent is not None else None
-            if found.type.rpartition(".")[2] != "Plugin" or panel is None:
-                continue
-            for item in panel.findChildren(QtCore.QObject):
-                if item.metaObject().indexOfSignal("contextEdited()") >= 0 and not item.property(
-                    _FOLLOWED
-                ):
-                    item.setProperty(_FOLLOWED, True)
-                    item.contextEdited.connect(partial(self._keep_context, panel, item))
-
-    def _keep_context(self, panel: Any, item: Any) -> None:
-        live = self._live
-        if live is None or live.document is None or not (is_alive(panel) and is_alive(item)):
-            return
-        found = _content_of(live.object_of(panel))
-        if found is None:
-            return
+        assert self._own_changes is not None
+        self._own_changes.paused = True
         try:
-            text = Code(item.contextText())
-            document = live.document.set_property(found, "context", text, overwrite=True)
-        except Error as error:
-            self.say(str(error))
-            return
-        self._history.push(self.tr("Settings of {}").format(found.type), document.text, "context")
-        live.show(document)
-        self._keep_recovery()
+            self._live.show(document)
+            self._own_changes.follow()
+        finally:
+            self._own_changes.paused = False
         self._refresh()
+
+    def _on_own_change(self, name: str, document: Document) -> None:
+        self._apply(name, document, merge=name)
 
     def _apply(self, name: str, document: Document, merge: str = "") -> None:
         """Make a change: the text is the truth, and the screen follows."""
@@ -837,7 +813,7 @@ class CockpitProgram(QtCore.QObject):
             selected=panel is not None,
             selectedTitle=_literal_title(panel),
         )
-        shown = _content_of(panel)
+        shown = content_of(panel)
         about = None if shown is None else self._about(shown.type)
         values = {}
         if shown is not None:
@@ -853,7 +829,7 @@ class CockpitProgram(QtCore.QObject):
         return find(kind, self._panels)
 
     def _on_property_edited(self, name: str, expression: str) -> None:
-        live, shown = self._live, _content_of(self._selection)
+        live, shown = self._live, content_of(self._selection)
         if live is None or live.document is None or shown is None:
             return
         document = live.document
@@ -1328,12 +1304,6 @@ def _is_wide(item: Any) -> bool:
 def _literal_title(panel: Any) -> str:
     member = panel.get("title") if panel is not None else None
     return str(member.value) if member is not None and member.kind == "literal" else ""
-
-
-def _content_of(panel: Any) -> Any:
-    """Return the object that a panel shows; None without one."""
-    children = panel.children if panel is not None else ()
-    return next(iter(children), None)
 
 
 def _readable(text: str) -> str:

@@ -273,3 +273,31 @@ def test_pages_for_all_robots_are_made_and_undone(edit: Callable[..., Any], file
     assert editor.text == LAYOUT
     for one in keep:
         one.close()
+
+
+def test_field_dropped_on_a_panel_is_written_to_the_layout(
+    edit: Callable[..., Any], file: Path
+) -> None:
+    file.write_text(LAYOUT.replace("Attitude {}", 'Gauge { path: "/a:data" }'))
+    editor = edit(file)
+    editor.wait(lambda: editor.program.property("opened"))
+    gauge = next(
+        one
+        for one in editor.root.findChildren(type(editor.window).__mro__[-2])
+        if one.metaObject().className().startswith("Gauge_QML")
+    )
+    gauge.setProperty("path", "/b:data")
+    editor.wait(lambda: 'Gauge { path: "/b:data" }' in editor.text)
+    editor.program.undo()
+    assert gauge.property("path") == "/a:data"
+    assert 'Gauge { path: "/a:data" }' in editor.text
+
+
+def test_layout_with_errors_outside_of_panels_is_named(
+    edit: Callable[..., Any], file: Path
+) -> None:
+    file.write_text(LAYOUT.replace("Split {", "Splitt {"))
+    editor = edit(file)
+    editor.answer(1)
+    assert "Splitt is not a type" in editor.program.property("problem")
+    assert not editor.program.property("opened")
