@@ -179,11 +179,13 @@ def test_jumps_are_notified(clock: Clock) -> None:
 
 def test_timer_calls_back_at_its_rate(clock: Clock) -> None:
     calls: list[float] = []
+    begun = time.monotonic()
     timer = clock.create_timer(0.02, lambda: calls.append(time.monotonic()))
     eventually(lambda: len(calls) >= 5)
     timer.close()
     timer.close()
-    assert 0.07 < calls[4] - calls[0] < 1
+    # A call that was late does not delay the following ones.
+    assert 0.09 < calls[4] - begun < 30
     count, turns = len(calls), []
     clock.create_timer(0.02, lambda: turns.append(1))
     eventually(lambda: len(turns) >= 3)
