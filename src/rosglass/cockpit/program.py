@@ -490,6 +490,8 @@ class CockpitProgram(QtCore.QObject):
         runtime = runtime_of(window)
         assert runtime is not None
         self._session = runtime.session
+        # The node begins when the user connects.
+        self._session.reminds = False
         self._stage = stage
         if choice.renderer == "software":
             self._panels = [
@@ -1145,6 +1147,13 @@ class CockpitProgram(QtCore.QObject):
             return
         self.help(f"{name.removesuffix('.md')}.html")
 
+    @Slot(QtGui.QColor)
+    def useLinkColor(self, color: QtGui.QColor) -> None:
+        """Show links of help in a colour: Markdown's come from the application's palette."""
+        palette = QtGui.QGuiApplication.palette()
+        palette.setColor(QtGui.QPalette.ColorRole.Link, color)
+        QtGui.QGuiApplication.setPalette(palette)
+
     @Slot()
     def closeHelp(self) -> None:
         """Close the page of help."""
@@ -1307,10 +1316,19 @@ def _literal_title(panel: Any) -> str:
 
 
 def _readable(text: str) -> str:
-    """Return a page without what only the web pages have: images and included files."""
-    lines = text.splitlines()
-    return "\n".join(
-        "```" if line.startswith("```") else line
-        for line in lines
-        if not line.startswith(("![", "--8<--"))
-    )
+    """Return a page as one text: without images, and with the files that it includes."""
+    lines = []
+    for line in text.splitlines():
+        if line.startswith("--8<--"):
+            lines += _example(line.split('"')[1])
+        elif not line.startswith("!["):
+            lines.append("```" if line.startswith("```") else line)
+    return "\n".join(lines)
+
+
+def _example(name: str) -> list[str]:
+    """Return the lines of an example; none if it does not come with the installation."""
+    for folder in (Path(__file__).parents[1] / "examples", Path(__file__).parents[3] / "examples"):
+        if (folder / name).is_file():
+            return (folder / name).read_text(encoding="utf-8").splitlines()
+    return []

@@ -958,10 +958,6 @@
         <translation>Wiederherstellen</translation>
     </message>
     <message>
-        <source>Settings of {}</source>
-        <translation>Einstellungen von {}</translation>
-    </message>
-    <message>
         <source>Cockpit</source>
         <translation>Cockpit</translation>
     </message>
@@ -991,7 +987,7 @@
     </message>
     <message>
         <source>A plugin asks for {}: a kiosk&apos;s layout stays</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Plugin verlangt {}: das Layout eines Kiosks bleibt</translation>
     </message>
     <message>
         <source>Add {}</source>
@@ -2555,6 +2551,13 @@
     <message>
         <source>There are no nodes yet.</source>
         <translation>Es gibt noch keine Knoten.</translation>
+    </message>
+</context>
+<context>
+    <name>OwnChanges</name>
+    <message>
+        <source>Settings of {}</source>
+        <translation>Einstellungen von {}</translation>
     </message>
 </context>
 <context>

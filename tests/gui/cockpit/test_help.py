@@ -104,6 +104,7 @@ def test_every_panel_of_the_catalogue_has_a_page_with_links_that_lead_on(
         program.help(panel.page)
         text = program.property("helpText")
         assert text.startswith("# "), panel.name
+        assert "--8<--" not in text, panel.name
         # An odd number would show the rest of the page as code.
         assert text.count("```") % 2 == 0, panel.name
         for link in re.findall(r"\]\(([^)\s]+\.md[^)]*)\)", text):

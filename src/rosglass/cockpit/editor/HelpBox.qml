@@ -6,6 +6,10 @@ import RosControls 1.0
 T.Popup {
     id: box
 
+    readonly property color links_: Theme.accent
+    onLinks_Changed: program.useLinkColor(links_)
+    Component.onCompleted: program.useLinkColor(links_)
+
     parent: T.Overlay.overlay
     anchors.centerIn: parent
     width: parent ? Math.min(820 * Theme.size, parent.width - 4 * Theme.gap) : 100

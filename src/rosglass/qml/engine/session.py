@@ -370,6 +370,8 @@ class Session(QtCore.QObject):
         self._ticker.setInterval(TICK)
         self._ticker.timeout.connect(self.tick)
         self._reminder: QtCore.QTimer | None = None
+        #: Whether to report that elements wait for a node; not where the user starts it.
+        self.reminds = True
         # Connected before the elements, which use the result.
         self.graph_changed.connect(self._find_duplicates)
         self._handlers: dict[str, dict[int, tuple[QtCore.QObject, Callable[[], None]]]] = {}
@@ -631,7 +633,8 @@ class Session(QtCore.QObject):
 
     def _remind(self) -> None:
         """Log once that elements wait for a node but init() was not called."""
-        if self._ticking > 0 and not self._closed and not self.is_initialized:
+        waiting = self._ticking > 0 and not self._closed and not self.is_initialized
+        if waiting and self.reminds:
             _log.warning("not connected: %s", NOT_INITIALIZED)
             self.forgotten.emit()
 
