@@ -200,3 +200,37 @@ def test_columns_that_scroll_are_those_computed_anew(seed: int) -> None:
             assert np.array_equal(columns.high[row], high)
         if 0 <= moved < count and before.shape == columns.low.shape and changed:
             assert np.array_equal(before[:, moved : moved + changed], columns.low[:, :changed])
+
+
+def test_bins_keep_their_extremes_in_order() -> None:
+    times = np.arange(10_007, dtype=np.int64) * 1000
+    values = np.sin(times / 1e5)
+    values[[17, 8_888]] = 9.0, -9.0
+    values[500:600] = np.nan
+    samples = Samples(bin_ns=50_000)
+    for at in range(0, len(times), 333):
+        samples.add(times[at : at + 333], values[at : at + 333])
+    kept_times, kept = samples.runs()[0]
+    bins = 10_007 // 50 + 1
+    # Of a bin that two additions share, up to four are kept.
+    assert bins <= len(samples) <= 2 * bins + 4 * (10_007 // 333 + 1)
+    assert samples.merged + len(samples) == 10_007
+    assert (np.nanmax(kept), np.nanmin(kept)) == (9.0, -9.0)
+    assert np.isnan(kept).any()
+    assert (np.diff(kept_times) > 0).all()
+    # As dense at the beginning as at the end.
+    assert abs(int((kept_times < 5_000_000).sum()) - len(kept) / 2) < 20
+    for at in range(0, 10_007, 50):
+        here = (kept_times >= at * 1000) & (kept_times < (at + 50) * 1000)
+        expected = values[at : at + 50]
+        if not np.isnan(expected).any():
+            assert (kept[here].min(), kept[here].max()) == (expected.min(), expected.max())
+
+
+def test_curves_in_bins_keep_pairs() -> None:
+    times = np.arange(1000, dtype=np.int64)
+    across, along = Samples(10, extremes=False), Samples(10, extremes=False)
+    across.add(times, times / 2.0)
+    along.add(times, -times / 1.0)
+    assert (across.runs()[0][0] == along.runs()[0][0]).all()
+    assert len(across) == 100

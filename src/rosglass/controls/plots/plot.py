@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm.node import Node
     from rosglass.controls.plots.frame import PlotFrame, ShownLine
+    from rosglass.controls.plots.recorded import RecordingReader
     from rosglass.controls.plots.samples import Samples
     from rosglass.controls.plots.series import FieldFeed, PlotReceiver, TopicFeed
     from rosglass.qml.engine.runtime import Runtime
@@ -154,6 +155,8 @@ class PlotData(Element):
     history = Writable(float, 600.0, _from_zero, then="_on_history", unit="s")
     paused = Writable(bool, False, then="_on_paused")
     stamps = Writable(bool, True, then="_on_series")
+    #: Whether a recording is plotted as a whole, not only what was played.
+    whole = Writable(bool, True, then="_on_series")
     gap = Writable(float, 0.0, _from_zero, then="redraw", unit="s")
     timeout = Writable(int, DEFAULT_TIMEOUT_MS, at_least(0), then="_update_stale", unit="ms")
     leftMin = Writable(float, math.nan, then="_on_axes")
@@ -179,6 +182,12 @@ class PlotData(Element):
     bottomTicks = ReadOnly(list, read=lambda self: self._bottom_ticks, notify="axesChanged")
     markCount = ReadOnly(int, read=lambda self: len(self._marks), notify="marksChanged")
     isXY = ReadOnly(bool, False)
+    #: Share of a recording that was read; 1 if there is nothing to read.
+    reading = ReadOnly(float, 1.0)
+    #: Samples that are not kept, as they are between the extremes of a short time.
+    merged = ReadOnly(float, 0.0)
+    #: Time that is played, in seconds of the stamps' clock; NaN unless a recording is shown whole.
+    moment = ReadOnly(float, read=lambda self: self._moment, notify="viewChanged")
 
     _HOLDS = (
         "_followed",
@@ -190,6 +199,7 @@ class PlotData(Element):
         "_frame",
         "_view",
         "_receiver",
+        "_recorded",
     )
     _series: list[Any]
     _paths: list[str]
@@ -198,6 +208,7 @@ class PlotData(Element):
     _history: float
     _paused: bool
     _stamps: bool
+    _whole: bool
     _gap: float
     _timeout: int
     _leftMin: float
@@ -227,7 +238,11 @@ class PlotData(Element):
         #: Samples and problems of the lines, as the legend shows them.
         self._shape: list[tuple[Samples | None, str]] = []
         self._feeds: dict[str, TopicFeed] = {}
-        self._receiver: PlotReceiver | None = None
+        self._receiver: PlotReceiver | RecordingReader | None = None
+        #: The receiver, if it reads a recording; and the window for the robot until then.
+        self._recorded: RecordingReader | None = None
+        self._window_before: float | None = None
+        self._moment = math.nan
         self._drawn: list[ShownLine] = []
         self._frame: PlotFrame = plot_frame.PlotFrame()
         self._view: Any = None
@@ -271,17 +286,29 @@ class PlotData(Element):
                 one.changed.connect(self._on_series)
         self._schedule()
 
-    def _wanted(self) -> tuple[Node] | None:
+    def _wanted(self) -> tuple[Node, bool] | None:
         node = self.node
-        return None if node is None else (node,)
+        return None if node is None else (node, self._whole and hasattr(node, "playback"))
 
-    def _factory(self, *wanted: Any) -> Callable[[], PlotReceiver]:
+    def _factory(self, *wanted: Any) -> Callable[[], PlotReceiver | RecordingReader]:
+        node, reads = wanted
+        if reads:
+            from rosglass.controls.plots.recorded import RecordingReader  # noqa: PLC0415 - numpy
+
+            return lambda: RecordingReader(node)
         make = self._kit.PlotReceiver
-        return lambda: make(*wanted)
+        return lambda: make(node)
 
-    def _on_created(self, endpoint: PlotReceiver) -> None:
+    def _on_created(self, endpoint: PlotReceiver | RecordingReader) -> None:
         url = self._session.url if self._session is not None else ""
-        if self._url is not None and url != self._url:
+        before, self._recorded = self._recorded, None
+        if not isinstance(endpoint, self._kit.PlotReceiver):
+            self._recorded = endpoint
+            first, last = endpoint.span
+            self._window_before = self._window
+            self.window = min(max((last - first) / 1e9, _MIN_WINDOW_S), _MAX_WINDOW_S)
+            self._end_ns = last
+        if before is not self._recorded or (self._url is not None and url != self._url):
             # Another robot, whose values must not be taken for those of the one before.
             for feed in self._feeds.values():
                 feed.clear()
@@ -296,6 +323,9 @@ class PlotData(Element):
     def _on_closed(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
         self._receiver = None
         self._gone = True
+        if self._recorded is not None and self._window_before is not None:
+            self.window, self._moment = self._window_before, math.nan
+            self._window_before = None
         self._update_stale()
 
     def _update(self) -> None:
@@ -449,6 +479,9 @@ class PlotData(Element):
 
     def _follow(self) -> None:
         """Move the right end to the newest time, which passes in silence, too."""
+        if self._recorded is not None:
+            self._follow_recording(self._recorded)
+            return
         now, ends = self._steady(), []
         for line in self._lines:
             span, topic = line.span, line.entry.topic
@@ -457,6 +490,13 @@ class PlotData(Element):
         end = max(ends, default=self._end_ns)
         if not self._end_ns - _MAX_JITTER_NS < end < self._end_ns:
             self._end_ns = end
+
+    def _follow_recording(self, recorded: RecordingReader) -> None:
+        """Show all of a recording; the time that is played in the middle, if a part is shown."""
+        first, last = recorded.span
+        window = round(self._window * 1e9)
+        middle = recorded.moment + window // 2
+        self._end_ns = min(last, max(first + window, middle)) if window < last - first else last
 
     @Slot()
     def _on_frame(self) -> None:
@@ -473,10 +513,13 @@ class PlotData(Element):
             return
         if sum(len(entry.feed.lines) for entry in self._entries if entry.feed) != self._line_count:
             self._rebuild()
-        if not self._paused:
-            before = self._end_ns
-            self._follow()
-            if self._end_ns != before:
+        if not self._paused or self._recorded is not None:
+            before = self._end_ns, self._moment
+            if not self._paused:
+                self._follow()
+            if self._recorded is not None:
+                self._moment = self._recorded.moment / 1e9
+            if (self._end_ns, self._moment) != before:
                 self.viewChanged.emit()
                 if not is_alive(self) or not is_alive(view):
                     return
@@ -494,7 +537,8 @@ class PlotData(Element):
 
     def _update_ticks(self, width: float, height: float) -> None:
         key = (width, height, self._window, self._isXY)
-        if self._paused:
+        relative = not self._paused and self._recorded is None
+        if not relative:
             key += (self._end_ns,)  # type: ignore[assignment]
         if key == self._ticks_key:
             return
@@ -506,9 +550,7 @@ class PlotData(Element):
             self._bottom_ticks = _as_js(self._frame.x_axis.ticks(width / 2))
         else:
             start = self._end_ns / 1e9 - self._window
-            self._bottom_ticks = _as_js(
-                time_ticks(start, self._window, width, relative=not self._paused)
-            )
+            self._bottom_ticks = _as_js(time_ticks(start, self._window, width, relative=relative))
         self.axesChanged.emit()
 
     # -- for QML ---------------------------------------------------------------------------------
@@ -670,6 +712,9 @@ class PlotData(Element):
             self._gone = False
         old = age < 0 or self._gone or not connected
         old = old or (self._timeout > 0 and age > self._timeout / 1000)
+        if self._recorded is not None:
+            # Of a recording, all times are shown at once, and none of them is now.
+            age, old = 0.0, not connected
         report(self, age=age, stale=old)
 
     def _update_readings(self) -> None:
@@ -679,6 +724,9 @@ class PlotData(Element):
             value = (
                 feed.latest[line.number] if feed and line.number < len(feed.latest) else math.nan
             )
+            if self._recorded is not None and line.samples is not None:
+                found = line.samples.before(self._recorded.moment)
+                value = found[1] if found is not None else math.nan
             declared = line.entry.declared
             if declared is not None and is_alive(declared) and line.number == 0:
                 report(
@@ -731,6 +779,11 @@ class PlotData(Element):
             lost += feed.lost
         removed = sum(line.samples.removed for line in self._lines if line.samples is not None)
         report(self, received=float(received), lost=float(lost + malformed), removed=float(removed))
+        report(
+            self,
+            reading=round(self._recorded.progress, 2) if self._recorded is not None else 1.0,
+            merged=float(sum(one.samples.merged for one in self._lines if one.samples is not None)),
+        )
 
 
 def _lines_of(entry: _Entry) -> Iterable[_Line]:

@@ -283,6 +283,18 @@ def _extremes(lows: Values, highs: Values, begins: NDArray[np.intp]) -> tuple[Va
     return found[0], found[1]
 
 
+def _kept(bins: NDArray[np.int64], values: Values, *, extremes: bool) -> NDArray[np.intp]:
+    """Return the indices of the least and greatest value, or of the first, of each bin."""
+    begins = np.append(0, np.flatnonzero(bins[1:] != bins[:-1]) + 1)
+    if not extremes or len(begins) == len(bins):
+        return begins
+    group = np.repeat(np.arange(len(begins)), np.diff(np.append(begins, len(bins))))
+    is_missing = np.isnan(values)
+    low = np.lexsort((np.where(is_missing, np.inf, values), group))[begins]
+    high = np.lexsort((np.where(is_missing, np.inf, -values), group))[begins]
+    return np.unique(np.concatenate((low, high)))
+
+
 class Samples:
     """The samples of one line; filled by one thread, and read by another.
 
@@ -292,9 +304,14 @@ class Samples:
     Attributes:
         removed: Samples that were dropped as they were older than the history.
         restarts: How often time went back.
+        merged: Samples that were left out as they are between the extremes of their bin.
+        bin_ns: Length of the bins, of which the least and greatest sample are kept; 0 keeps all.
+        extremes: Whether these are kept; otherwise, the first one of each bin.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, bin_ns: int = 0, *, extremes: bool = True) -> None:
+        self.bin_ns, self.extremes = bin_ns, extremes
+        self.merged = 0
         self._lock = threading.RLock()
         self._runs: deque[_Run] = deque()
         self._changed_from = _MAX_TIME
@@ -323,7 +340,7 @@ class Samples:
         with self._lock:
             pauses = sorted(self._pauses)
         usual = pauses[len(pauses) // 2] if pauses else 0
-        return max(_MIN_GAP_NS, _PAUSES * usual)
+        return max(_MIN_GAP_NS, _PAUSES * max(usual, self.bin_ns))
 
     def add(self, times: Times, values: Values) -> None:
         """Add samples in the order in which they arrived.
@@ -335,6 +352,10 @@ class Samples:
         if not len(times):
             return
         times = np.clip(times, -_MAX_TIME, _MAX_TIME)
+        if self.bin_ns:
+            kept = _kept(times // self.bin_ns, values, extremes=self.extremes)
+            self.merged += len(times) - len(kept)
+            times, values = times[kept], values[kept]
         with self._lock:
             while len(times):
                 count = self._count_before_restart(times)
@@ -355,7 +376,7 @@ class Samples:
             self._runs.clear()
             self._pauses.clear()
             self._changed_from = -_MAX_TIME
-            self.removed = self.restarts = 0
+            self.removed = self.restarts = self.merged = 0
 
     def forget(self, before: int, most: int) -> None:
         """Drop old samples, in blocks, and count them.

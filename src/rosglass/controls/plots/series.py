@@ -101,6 +101,7 @@ class FieldFeed:
         self.latest: list[float] = []
         #: The problem of the last values, and that of the type.
         self.value_problem = ""
+        self._bin_ns = 0
 
     def check(self, kind: MessageType) -> None:
         """Check the paths against a type, and set the unit.
@@ -122,10 +123,10 @@ class FieldFeed:
         table = self._table(values)
         x_table = None if x_values is None else self._table(x_values)
         while len(self.lines) < table.shape[1]:
-            self.lines.append(Samples())
+            self.lines.append(Samples(self._bin_ns, extremes=not self.x_field))
             self.latest.append(np.nan)
             if x_table is not None:
-                self.x_lines.append(Samples())
+                self.x_lines.append(Samples(self._bin_ns, extremes=False))
         # Elements that are missing now have a gap.
         for at, line in enumerate(self.lines):
             column = table[:, at] if at < table.shape[1] else np.full(len(times), np.nan)
@@ -141,6 +142,12 @@ class FieldFeed:
         """Drop samples before a time, and those that are too many."""
         for line in (*self.lines, *self.x_lines):
             line.forget(before, _MAX_SAMPLES)
+
+    def merge_within(self, bin_ns: int) -> None:
+        """Keep the extremes of such times only, of further samples; of curves, the first."""
+        self._bin_ns = bin_ns
+        for line in (*self.lines, *self.x_lines):
+            line.bin_ns = bin_ns
 
     def restart(self) -> None:
         """Begin new runs, as times are those of another clock from now on."""
@@ -287,6 +294,10 @@ class TopicFeed:
         if self.subscription is not None:
             statistics = self.subscription.statistics()
             self.lost = statistics.dropped + statistics.lost
+
+    def read(self, kind: MessageType, wire: str, samples: list[Sample]) -> None:
+        """Read messages of one type."""
+        self._read(kind, wire, self.fields, samples)
 
     def _read(
         self, kind: MessageType, wire: str, fields: tuple[FieldFeed, ...], samples: list[Sample]

@@ -18,6 +18,8 @@ LiveFrame {
     property alias paused: plotted.paused
     // Whether times are those of the headers; otherwise, of reception.
     property alias stamps: plotted.stamps
+    // Whether a recording is plotted as a whole at once, not only what was played.
+    property alias whole: plotted.whole
     // Seconds without samples that are a gap in a line; 0 for 5 times its usual pause, at least 1 s.
     property alias gap: plotted.gap
     // Milliseconds without any sample after which the plot is stale.
@@ -104,6 +106,8 @@ LiveFrame {
     contentWidth: 480 * Theme.size
     contentHeight: 260 * Theme.size
     note: paused ? (plotted.behind > 0.5 ? qsTr("PAUSED, %1 s ago").arg(plotted.behind.toFixed(0)) : qsTr("PAUSED"))
+        : plotted.reading < 1 ? qsTr("reading, %1 %").arg((100 * plotted.reading).toFixed(0))
+        : plotted.merged > 0 ? qsTr("extremes of %1 samples").arg((plotted.received).toFixed(0))
         : lost > 0 ? qsTr("%1 lost").arg(lost.toFixed(0)) : ""
 
     PlotData {
@@ -291,6 +295,14 @@ LiveFrame {
                     font.pixelSize: Theme.small
                 }
             }
+        }
+        Rectangle {
+            objectName: "moment"
+            x: Math.round(area.width * (1 - (plotted.end - plotted.moment) / plotted.window))
+            visible: !plotted.isXY && x >= 0 && x <= area.width
+            width: 1
+            height: area.height
+            color: Theme.accent
         }
         PinchHandler {
             property real before_: 1
