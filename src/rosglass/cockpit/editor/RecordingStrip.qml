@@ -68,7 +68,7 @@ Rectangle {
                 anchors { left: parent.left; right: limits.left; rightMargin: Theme.gap; top: parent.top; bottom: parent.bottom }
                 title: qsTr("Recorder")
                 sizeLimit: limit.currentIndex < limit.bytes.length ? limit.bytes[limit.currentIndex] : 0
-                onFinished: function(file, reason) { program.say(file ? qsTr("recorded to %1 (%2)").arg(file).arg(reason) : reason) }
+                onFinished: function(file, reason) { program.say(file ? qsTr("recorded to %1").arg(file) + " (" + reason + ")" : reason) }
                 onFailed: function(reason) { program.say(reason) }
             }
             Column {
