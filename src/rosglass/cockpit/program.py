@@ -36,6 +36,7 @@ from rosglass.controls.topics.graph_watch import GraphWatch
 from rosglass.errors import Error
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qml.engine.runtime import runtime_of
+from rosglass.qml.engine.watchdog import Watchdog
 from rosglass.qml.run.modules import locate
 from rosglass.qml.run.renderer_choice import choice
 from rosglass.qt import QtCore, QtGui, QtQml, Signal, Slot, is_alive
@@ -493,6 +494,7 @@ class CockpitProgram(QtCore.QObject):
         # The node begins when the user connects.
         self._session.reminds = False
         self._stage = stage
+        Watchdog.of(runtime.session).script_ended.connect(self._on_script_ended)
         if choice.renderer == "software":
             self._panels = [
                 replace(one, problem=self.tr("needs OpenGL: start with --renderer opengl"))
@@ -535,6 +537,10 @@ class CockpitProgram(QtCore.QObject):
             [self.tr("Restore it"), self.tr("Discard it")],
             decide,
         )
+
+    def _on_script_ended(self, engine: Any, text: str) -> None:
+        del engine
+        self.say(text)
 
     def _keep_closed(self) -> None:
         """Offer robots, unless there is a layout to go on with."""
