@@ -654,6 +654,7 @@ class CockpitProgram(QtCore.QObject):
             self._properties = PropertyModel(self, runtime_of(self._window))
             self._properties.edited.connect(self._on_property_edited)
             report(self, form=self._properties)
+            self._graph = GraphWatch(self, runtime_of(self._window))
         live = LiveLayout(path, self._session, self._stage, import_paths=self._import_paths)
         live.edited.connect(self._apply)
         live.refused.connect(self.say)
@@ -1007,8 +1008,7 @@ class CockpitProgram(QtCore.QObject):
         assert live is not None
         if live.document is None:
             return
-        if self._graph is None:
-            self._graph = GraphWatch(self, runtime_of(self._window))
+        assert self._graph is not None
         robots = self._graph.namespaces(_ROBOT_TOPIC)
         try:
             pages = pages_for_robots(live.document, robots, self._has_ns)

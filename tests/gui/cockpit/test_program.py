@@ -251,15 +251,13 @@ def test_pages_for_all_robots_are_made_and_undone(edit: Callable[..., Any], file
     editor = edit(file)
     editor.wait(lambda: editor.program.opened)
     editor.program.run("edit")
-    editor.program.run("robot pages")
-    assert "no robot is found" in editor.program.message
     twist = "geometry_msgs/msg/Twist"
     keep = [
         editor.bench.robot.create_subscription(f"/{name}/cmd_vel", twist, lambda _: None)
         for name in ("anna", "bert", "carl")
     ]
-    graph = editor.program._graph
-    editor.wait(lambda: len(graph.namespaces("cmd_vel")) == 3)
+    node = editor.bench.session.node
+    editor.wait(lambda: "/carl/cmd_vel" in node.topics())
     editor.program.run("robot pages")
     assert editor.text.count("Page {") == 3
     pages = editor.root.property("pages").toVariant()
@@ -273,6 +271,9 @@ def test_pages_for_all_robots_are_made_and_undone(edit: Callable[..., Any], file
     assert editor.text == LAYOUT
     for one in keep:
         one.close()
+    editor.wait(lambda: "/carl/cmd_vel" not in node.topics())
+    editor.program.run("robot pages")
+    assert "no robot is found" in editor.program.message
 
 
 def test_field_dropped_on_a_panel_is_written_to_the_layout(
