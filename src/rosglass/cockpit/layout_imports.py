@@ -166,6 +166,12 @@ def _panel(title: str, content: str) -> str:
     return _block("Panel", [f"title: {to_qml(title)}", content])
 
 
+def _titled(panel: str, title: str) -> str:
+    """Return a panel with another title."""
+    head, _, rest = panel.split("\n", 2)
+    return f"{head}\n    title: {to_qml(title)}\n{rest}"
+
+
 def _split(vertical: bool, places: list[tuple[float, _Place]]) -> _Place:
     """Return a split without empty places, and without splits of the same direction in it."""
     flat: list[tuple[float, _Place]] = []
@@ -421,6 +427,8 @@ class _Foxglove(_Import):
                 current = len(panels)
             if len(inside) > 1:
                 self.note(f"Tab {shown(title)}: its {len(inside)} panels are tabs of their own")
+            elif inside:
+                inside = [_titled(inside[0], title)]
             panels += inside
         return _Tabs(panels, current) if len(panels) > 1 else panels[0] if panels else None
 

@@ -589,12 +589,16 @@ class CockpitProgram(QtCore.QObject):
         """Show a layout of another program as a new one, and list what is not as it was there."""
         imported = import_layout(path, self._plugin_names)
         self._begin(imported.text, path.stem)
-        for line in imported.left_out:
+        left_out = [*imported.left_out]
+        scene = self._about("SceneView")
+        if "SceneView" in imported.text and scene is not None and scene.problem:
+            left_out.append(f"SceneView: {scene.problem}")
+        for line in left_out:
             _log.warning("%s: %s", path, line)
-        if imported.left_out:
-            lines = [f"• {line}" for line in imported.left_out[:_MAX_LEFT_OUT]]
-            if len(imported.left_out) > _MAX_LEFT_OUT:
-                more = len(imported.left_out) - _MAX_LEFT_OUT
+        if left_out:
+            lines = [f"• {line}" for line in left_out[:_MAX_LEFT_OUT]]
+            if len(left_out) > _MAX_LEFT_OUT:
+                more = len(left_out) - _MAX_LEFT_OUT
                 lines.append(self.tr("and {} more, which are logged").format(more))
             text = self.tr("This layout of {} was read, except for:").format(imported.program)
             self._ask("\n".join([text, *lines]), [self.tr("Go on")], lambda _: None)

@@ -144,6 +144,7 @@ def test_tabs_of_foxglove_are_pages_or_tabs(read: Any) -> None:
         *("ParameterForm", "LogView", "TopicTree")
     ]
     assert tabs.get("currentIndex").value == 1
+    assert [one.get("title").value for one in tabs.children] == ["A", "Log view", "Topic tree"]
     assert found.left_out == ("Tab 'B': its 2 panels are tabs of their own",)
 
 
