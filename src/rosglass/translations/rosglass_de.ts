@@ -866,6 +866,14 @@
         <source>cancel dragging</source>
         <translation>Ziehen abbrechen</translation>
     </message>
+    <message>
+        <source>This page is empty: choose a panel from the list, or drag one here.</source>
+        <translation>Diese Seite ist leer: ein Panel aus der Liste wählen oder hierher ziehen.</translation>
+    </message>
+    <message>
+        <source>This page is empty. Edit the layout to add panels.</source>
+        <translation>Diese Seite ist leer. Beim Bearbeiten des Layouts Panels hinzufügen.</translation>
+    </message>
 </context>
 <context>
     <name>CockpitProgram</name>

@@ -173,3 +173,12 @@ def test_keyboard_alone_adds_changes_moves_and_removes_a_panel(
     before = editor.text
     editor.key("Delete")
     editor.wait(lambda: len(editor.text) < len(before))
+
+
+def test_empty_page_says_what_to_do_next(edit: Callable[..., Any]) -> None:
+    editor = edit()
+    editor.click("new")
+    editor.wait(lambda: editor.program.property("opened"))
+    assert "choose a panel" in editor.find("emptyPage").property("text")
+    editor.program.add(0)
+    editor.wait(lambda: search(editor, "emptyPage") is None)

@@ -214,6 +214,21 @@ Item {
         source: "DragLayer.qml"
         onLoaded: item.cockpit = cockpit
     }
+    ThemeText {
+        objectName: "emptyPage"
+        anchors.centerIn: stage
+        width: Math.min(stage.width - 2 * Theme.gap, 420 * Theme.size)
+        // A panel that is in a window of its own still belongs to the page.
+        visible: cockpit.page !== null && cockpit.page.elements_.length === 0
+            && !Elements.list(cockpit.page.children).some(child => child.element_ !== undefined)
+        text: cockpit.editing ? qsTr("This page is empty: choose a panel from the list, or drag one here.")
+            : qsTr("This page is empty. Edit the layout to add panels.")
+        color: Theme.dim
+        wrapMode: Text.Wrap
+        horizontalAlignment: Text.AlignHCenter
+        Accessible.role: Accessible.StaticText
+        Accessible.name: text
+    }
     Item {
         id: stage
         anchors { left: parent.left; right: parent.right; top: bar.bottom; bottom: parent.bottom }
