@@ -225,3 +225,38 @@ def test_the_robot_is_recorded_from_the_window(
         assert "/text" in [channel.topic for channel in bag.channels]
     editor.program.run("mark")
     assert editor.program.property("message") == "nothing is being recorded"
+
+
+def test_images_of_a_recording_are_late_by_what_was_recorded(
+    edit: Callable[..., Any], tmp_path: Path
+) -> None:
+    kind: Any = rosglass.load("sensor_msgs/msg/Image")
+    path = tmp_path / "camera.mcap"
+    with path.open("wb") as stream:
+        writer = mcap_writer.Writer(stream)
+        writer.start("ros2")
+        schema = writer.register_schema(kind.name, "ros2msg", full_text(kind.definition).encode())
+        number = writer.register_channel("/camera", "cdr", schema)
+        for at in range(100):
+            time = START + at * SECOND // 10
+            stamp = {"sec": time // SECOND, "nanosec": time % SECOND}
+            image = {"width": 4, "height": 4, "encoding": "mono8", "step": 4, "data": bytes(16)}
+            data = kind.encode({"header": {"stamp": stamp}, **image})
+            writer.add_message(number, time + SECOND // 5, data, time)
+        writer.finish()
+    editor = edit(path)
+    editor.wait(lambda: editor.program.property("hasLayout"))
+    assert "CameraView" in editor.text
+
+    def view() -> Any:
+        waiting = [editor.root]
+        while waiting:
+            one = waiting.pop()
+            if one.metaObject().className().startswith("CameraView"):
+                return one
+            waiting += one.childItems()
+        return None
+
+    editor.wait(lambda: view() is not None and view().property("latency") > 0)
+    assert view().property("latency") == pytest.approx(200, abs=50)
+    assert not view().property("late")
