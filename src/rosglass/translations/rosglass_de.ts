@@ -2823,6 +2823,14 @@
         <translation>PAUSE</translation>
     </message>
     <message>
+        <source>reading, %1 %</source>
+        <translation>liest, %1 %</translation>
+    </message>
+    <message>
+        <source>extremes of %1 samples</source>
+        <translation>Extreme aus %1 Werten</translation>
+    </message>
+    <message>
         <source>%1 lost</source>
         <translation>%1 verloren</translation>
     </message>
@@ -3208,8 +3216,8 @@
         <translation>Aufnahme</translation>
     </message>
     <message>
-        <source>recorded to %1 (%2)</source>
-        <translation>aufgenommen in %1 (%2)</translation>
+        <source>recorded to %1</source>
+        <translation>aufgenommen in %1</translation>
     </message>
     <message>
         <source>ends at</source>
