@@ -187,3 +187,10 @@ def test_keys_do_not_press_a_button_of_a_hidden_page_or_tab(layouts: Any, change
     layouts.wait(lambda: not button.isVisible())
     layouts.key("Space")
     assert layouts.root.property("pressed") == 1
+
+
+def test_window_is_no_larger_than_the_screen(opened: Any) -> None:
+    # The screen of the offscreen platform has 800x800 pixels.
+    screen = opened.window.screen().size()
+    assert opened.window.width() <= screen.width()
+    assert opened.window.height() <= screen.height()

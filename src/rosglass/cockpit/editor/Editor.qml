@@ -11,8 +11,8 @@ Window {
     readonly property Item stage: stage_
     property bool sure_: false
 
-    width: 1280
-    height: 800
+    width: Math.min(1280, Screen.width)
+    height: Math.min(800, Screen.height)
     visible: true
     color: Theme.background
     title: (program.modified ? "• " : "") + (program.opened ? program.name : qsTr("Cockpit")) + " – rosglass"
