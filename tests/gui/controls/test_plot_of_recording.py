@@ -180,6 +180,7 @@ def test_only_what_is_played_on_request(plot_of: Any, tmp_path: Path, wait: Any)
     wait(lambda: 3 < shown.count() < 900)
     assert shown.get("window") == 20
     assert math.isnan(shown.get("moment"))
+    assert not shown.window.find("moment").isVisible()
     shown.item.setProperty("whole", True)
     wait(lambda: shown.count() == 1001)
     shown.item.setProperty("whole", False)

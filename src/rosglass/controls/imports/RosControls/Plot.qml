@@ -298,7 +298,8 @@ LiveFrame {
         }
         Rectangle {
             objectName: "moment"
-            x: Math.round(area.width * (1 - (plotted.end - plotted.moment) / plotted.window))
+            // NaN of a robot would be the left edge.
+            x: isFinite(plotted.moment) ? Math.round(area.width * (1 - (plotted.end - plotted.moment) / plotted.window)) : -1
             visible: !plotted.isXY && x >= 0 && x <= area.width
             width: 1
             height: area.height
