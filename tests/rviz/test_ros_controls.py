@@ -109,7 +109,7 @@ def test_map_is_moved_zoomed_and_takes_goals(
 ) -> None:
     root = over('MapView { objectName: "map"; x: 20; y: 20; width: 400; height: 400 }')
     shown = item(root, "map")
-    wait(lambda: not shown.property("stale"))
+    wait(lambda: not shown.property("stale") and shown.property("fitted_"))
     camera, before = shown.property("camera"), (view("Yaw"), view("Distance"))
     x, y = middle(item(root, "plane"))
     scale, centre = camera.property("scale"), camera.property("centerX")
