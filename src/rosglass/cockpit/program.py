@@ -507,7 +507,9 @@ class CockpitProgram(QtCore.QObject):
         self._list_catalogue()
         self._timer.start()
         self._look()
-        report(self, hints=not (self._state / _HINTS_SEEN).exists())
+        # Not over a layout that was given, of which it would cover controls.
+        first = self._to_open is None and not (self._state / _HINTS_SEEN).exists()
+        report(self, hints=first)
         if self._to_open is not None:
             self.open(str(self._to_open))
         if self._url_given.startswith(SCHEME):

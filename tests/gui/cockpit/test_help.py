@@ -66,6 +66,14 @@ def test_tour_begins_at_the_first_start_and_escape_ends_it(
     assert not edit().program.property("hints")
 
 
+@pytest.mark.first_start
+def test_tour_does_not_cover_a_layout_that_was_given(edit: Callable[..., Any], file: Path) -> None:
+    editor = edit(file)
+    editor.wait(lambda: editor.program.property("opened"))
+    assert not editor.program.property("hints")
+    assert search(editor, "hintText") is None
+
+
 def test_tour_is_started_again_by_the_palette(edit: Callable[..., Any], file: Path) -> None:
     editor = edit(file)
     editor.wait(lambda: editor.program.property("opened"))
