@@ -18,7 +18,7 @@ from rosglass.cockpit.qml_document import Document
 from rosglass.cockpit.qml_values import Code, to_qml
 from rosglass.comm.text_files import explain_yaml_error, load_pyyaml, load_yaml
 from rosglass.errors import ArgumentError, Error, shown
-from rosglass.messages.message import parse_path
+from rosglass.messages import parse_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

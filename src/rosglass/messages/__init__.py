@@ -1,7 +1,7 @@
 """Messages: lazy trees over received bytes, their types, and the codecs."""
 
-from rosglass.messages.message import Message
-from rosglass.messages.sequences import MessageSequence
+from rosglass.messages.message import Message, parse_path, resolve_path
+from rosglass.messages.sequences import MessageSequence, read_columns
 from rosglass.messages.translation import ActionTranslation, ServiceTranslation, Translation
 from rosglass.messages.types import (
     ActionType,
@@ -27,5 +27,8 @@ __all__ = [
     "Translation",
     "default_library",
     "load",
+    "parse_path",
+    "read_columns",
+    "resolve_path",
     "type_of",
 ]

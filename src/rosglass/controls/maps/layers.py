@@ -22,7 +22,7 @@ from rosglass.controls.maps.grid import GridReader, theme_colors
 from rosglass.controls.maps.tiles import TileLayer
 from rosglass.errors import Error, TransformException
 from rosglass.images.grid_colors import grid_colors
-from rosglass.messages.sequences import read_columns
+from rosglass.messages import read_columns
 from rosglass.qml.elements.element import TopicElement
 from rosglass.qml.elements.message_queue import MessageQueue, QueuedMessage, Subscriptions
 from rosglass.qml.engine.properties import ReadOnly, Writable, report

@@ -20,7 +20,7 @@ from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.controls.plots.samples import Samples
 from rosglass.errors import Error, FieldPathError, TypeNotFoundError
 from rosglass.interfaces.names import ros1_name
-from rosglass.messages.message import parse_path, resolve_path
+from rosglass.messages import parse_path, resolve_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -11,7 +11,7 @@ import numpy as np
 from rosglass.comm.qos import QoS, Reliability
 from rosglass.errors import Error
 from rosglass.images.grid_colors import grid_colors
-from rosglass.messages.sequences import read_columns
+from rosglass.messages import read_columns
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.scene.configs.settings import Setting, rgb_of
 from rosglass.scene.displays.topic_display import TopicDisplay

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.messages.sequences import read_columns
+from rosglass.messages import read_columns
 from rosglass.scene.configs.settings import Setting, rgb_of
 from rosglass.scene.displays.shapes import ALONG, ArrowShapes, AxesShapes
 from rosglass.scene.displays.topic_display import HistoryDisplay, TopicDisplay
