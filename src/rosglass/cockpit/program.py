@@ -134,6 +134,8 @@ class CockpitProgram(QtCore.QObject):
     form = ReadOnly(QtCore.QObject, None)
     #: A question to the user, and its answers.
     question = ReadOnly(str, "")
+    #: The answer that Return takes.
+    firstAnswer = ReadOnly(int, 0)
     answers: Any = ReadOnly("QStringList", ())  # type: ignore[arg-type]
     #: Title and text (Markdown) of the page of help that is shown; empty if none is.
     helpText = ReadOnly(str, "")
@@ -470,9 +472,12 @@ class CockpitProgram(QtCore.QObject):
         self._said_at = time.monotonic()
         report(self, message=text)
 
-    def _ask(self, text: str, answers: list[str], reply: Callable[[int], object]) -> None:
+    def _ask(
+        self, text: str, answers: list[str], reply: Callable[[int], object], first: int = 0
+    ) -> None:
+        """Ask the user; Return takes the answer with the number `first`."""
         self._reply = reply
-        report(self, answers=answers, question=text)
+        report(self, answers=answers, firstAnswer=first, question=text)
 
     @Slot(int)
     def answer(self, index: int) -> None:
@@ -585,6 +590,7 @@ class CockpitProgram(QtCore.QObject):
                 self.tr("Do not open"),
             ],
             lambda index: self._decide_on(index, file, document),
+            first=2,
         )
 
     def _import(self, path: Path) -> None:
@@ -1270,6 +1276,7 @@ class CockpitProgram(QtCore.QObject):
             ),
             [self.tr("Take theirs"), self.tr("Keep mine")],
             decide,
+            first=1,
         )
 
     def close(self) -> None:

@@ -212,10 +212,14 @@ def edit(
         return made[-1]
 
     yield start
-    from rosglass.qt import send_deferred_deletes
+    from rosglass.qt import QtGui, send_deferred_deletes
 
     for one in made:
         one.program.close()
+    # A window's shortcuts are those of the whole application; its Python half may be gone.
+    for window in QtGui.QGuiApplication.topLevelWindows():
+        if window.title().endswith("rosglass"):
+            window.deleteLater()
     send_deferred_deletes()
 
 

@@ -258,7 +258,7 @@ def test_thousand_edits_of_all_files_and_their_undo(tmp_path: Path) -> None:
         assert [history.redo() for _ in texts[1:]] == texts[1:]
         (tmp_path / f"{index}.qml").write_bytes(document.text.encode())
     assert editor.edits.total() > 1000
-    assert min(editor.edits.values()) > 20
+    assert min(editor.edits.values()) > 10
     assert set(refused_by_qt(tmp_path).values()) <= {CRASHED}
 
 

@@ -154,6 +154,7 @@ Window {
         objectName: "question"
         text: program.question
         answers: program.answers
+        first: program.firstAnswer
         onAnswered: function(index) { program.answer(index) }
         Connections {
             target: program

@@ -8,11 +8,13 @@ T.Popup {
 
     property string text
     property var answers: []
+    // The answer that Return takes.
+    property int first: 0
     signal answered(int index)
 
     function first_() {
         if (choices.count)
-            choices.itemAt(0).forceActiveFocus(Qt.TabFocusReason)
+            choices.itemAt(first).forceActiveFocus(Qt.TabFocusReason)
     }
 
     function choose(index) {
