@@ -476,6 +476,8 @@ def test_two_commands_of_a_topic_steer_one_at_a_time(controls: Any, wait: Any) -
     assert not screen.property("steersB"), "it was pressed while the other one was held"
     screen.setProperty("holdB", False)
     hold("holdB", -0.5)
+    # Pressed more than once, its own zeros come in between.
+    wait(lambda: robot.speeds[-3:] == [-0.5] * 3)
     # Within the second in which the first one's zeros would go on.
     begin = len(robot.speeds)
     wait(lambda: len(robot.speeds) > begin + 10)
