@@ -199,9 +199,9 @@ def test_one_of_two_operators_lets_go(screen: str, tmp_path: Path) -> None:
             one.x11("mouseup", 1)
             eventually(lambda: sum(not speed for _, speed in robot.received) >= 3)
             robot.received.clear()
-            nothing_happens(1.5)
-            assert fast not in speeds(), "the one that let go moves it"
-            assert speeds() == {slow}, "the other goes on, and the zeros have ended"
+            # The zeros end a second after the last one that was dropped, as on a busy machine.
+            eventually(lambda: len(robot.received) > 10 and speeds() == {slow})
+            assert all(speed < fast - 0.01 for _, speed in robot.received), "who let go moves it"
             other.x11("keyup w")
             eventually(lambda: robot.zeros >= 3)
             eventually(lambda: time.monotonic() - robot.received[-1][0] > 0.5)
