@@ -37,7 +37,7 @@ from rosglass.errors import Error
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qml.engine.runtime import runtime_of
 from rosglass.qml.engine.watchdog import Watchdog
-from rosglass.qml.run.modules import locate
+from rosglass.qml.run.modules import interface_file, locate
 from rosglass.qml.run.renderer_choice import choice
 from rosglass.qt import QtCore, QtGui, QtQml, Signal, Slot, is_alive
 from rosglass.wires.zenoh.options import shown_url
@@ -184,6 +184,8 @@ class CockpitProgram(QtCore.QObject):
         if layout and is_recording(layout):
             layout, url = "", replay_url(str(Path(layout).absolute()))
         self._to_open, self._url_given = (locate(layout) if layout else None), url
+        if self._to_open is not None and self._to_open.suffix == ".qml":
+            interface_file(layout)  # names the nearest file
         if self._to_open is not None:
             choice.expect(self._to_open)
         self._import_paths = list(import_paths)

@@ -302,3 +302,11 @@ def test_layout_with_errors_outside_of_panels_is_named(
     editor.answer(1)
     assert "Splitt is not a type" in editor.program.property("problem")
     assert not editor.program.property("opened")
+
+
+def test_misspelt_layout_is_refused_with_the_nearest_name(app: Any, file: Path) -> None:
+    from rosglass.cockpit.program import CockpitProgram
+    from rosglass.errors import QmlError
+
+    with pytest.raises(QmlError, match=r"did you mean drive\.qml"):
+        CockpitProgram(file.with_name("drve.qml"))
